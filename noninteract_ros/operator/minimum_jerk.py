@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Minimum-jerk moves from rest to rest."""
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from noninteract_ros.control.reference import Reference
+
+
+def blend(u: float) -> tuple[float, float, float]:
+    """The quintic from 0 to 1 that starts and ends at rest.
+
+    Args:
+        u: Share of the duration that has passed; clipped to [0, 1].
+
+    Returns:
+        Value, and first and second derivative with respect to `u`.
+    """
+    u = min(max(u, 0.0), 1.0)
+    return (
+        u**3 * (10.0 + u * (6.0 * u - 15.0)),
+        30.0 * u**2 * (1.0 - u) ** 2,
+        60.0 * u * (1.0 - u) * (1.0 - 2.0 * u),
+    )
+
+
+class RestToRest:
+    """Rests at the first value, then moves from each value to the next; C2 for all times.
+
+    Move i leads from `values[i]` to `values[i + 1]`, beginning at `starts[i]` and lasting
+    `durations[i]`. Moves are in order of time and do not overlap; between them the motion rests.
+    """
+
+    def __init__(self, starts: ArrayLike, durations: ArrayLike, values: ArrayLike) -> None:
+        """Takes moves that were checked.
+
+        Args:
+            starts: Times at which the moves start [s], shape (n,), increasing.
+            durations: Their durations [s], shape (n,), positive.
+            values: Resting values, shape (n + 1, dim).
+        """
+        self._starts: NDArray[np.float64] = np.array(starts, dtype=np.float64)
+        self._durations: NDArray[np.float64] = np.array(durations, dtype=np.float64)
+        self._values: NDArray[np.float64] = np.array(values, dtype=np.float64)
+
+    def __call__(self, t: float) -> Reference:
+        """The motion at time `t` [s]."""
+        move = int(np.searchsorted(self._starts, t, side="right")) - 1
+        if move < 0:
+            return Reference.still(self._values[0])
+        duration = float(self._durations[move])
+        value, rate, curvature = blend((t - float(self._starts[move])) / duration)
+        if value == 1.0:
+            return Reference.still(self._values[move + 1])
+        way = self._values[move + 1] - self._values[move]
+        return Reference(
+            self._values[move] + value * way, rate / duration * way, curvature / duration**2 * way
+        )
