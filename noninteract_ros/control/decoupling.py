@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+"""THE LAW: noninteracting control of a team's subtasks.
+
+Two forms of the same torque. The plain one is the paper's, with Gamma and alpha, equation (7);
+the fast one commands a task acceleration and lets inverse dynamics find the torque. Symbols are
+those of docs/derivations.md.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noninteract_ros.control.impedance import Impedance
+from noninteract_ros.subtasks.subtask import SubtaskState
+from noninteract_ros.team.team import TeamState
+
+Array = NDArray[np.float64]
+LAWS = ("noninteracting", "natural", "paper")
+
+
+@dataclass(frozen=True, slots=True)
+class TaskDynamics:
+    """The team's dynamics seen through its subtasks.
+
+    Attributes:
+        M: Team inertia, shape (n, n).
+        C: Team Coriolis matrix, shape (n, n).
+        g: Gravity torque, shape (n,).
+        J: Stacked Jacobian, shape (n, n).
+        J_rate: Its rate, shape (n, n).
+        S: Inverse of J, shape (n, n); its column blocks are S_i.
+        MS: M S, shape (n, n).
+        inertia: Natural task inertia Lambda = S' M S, shape (n, n).
+        slices: Coordinates of each subtask.
+        inertias: M_i of each decoupled subtask, shape (p_i, p_i).
+        constant: Whether M_i was asked for as a constant (remark 2); then its C~_i is zero.
+    """
+
+    M: Array
+    C: Array
+    g: Array
+    J: Array
+    J_rate: Array
+    S: Array
+    MS: Array
+    inertia: Array
+    slices: tuple[slice, ...]
+    inertias: tuple[Array, ...]
+    constant: tuple[bool, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class TaskError:
+    """Tracking state of all subtasks, stacked, shape (n,) each.
+
+    Attributes:
+        e: x - x_d.
+        e_rate: Its time derivative.
+        reference_velocity: Desired velocity.
+        reference_acceleration: Desired acceleration.
+        force: Force input of the sources, added to (30), remark 1.
+    """
+
+    e: Array
+    e_rate: Array
+    reference_velocity: Array
+    reference_acceleration: Array
+    force: Array
+
+
+def task_dynamics(
+    state: TeamState,
+    task: SubtaskState,
+    slices: tuple[slice, ...],
+    desired_inertias: Sequence[Array | None],
+) -> TaskDynamics:
+    """Terms that every law shares.
+
+    Raises:
+        numpy.linalg.LinAlgError: J is exactly singular (assumption 3).
+    """
+    S = np.linalg.inv(task.J)
+    MS = state.M @ S
+    inertia = S.T @ MS
+    inertias = tuple(
+        inertia[part, part] if desired is None else np.diag(desired)  # Remark 2.
+        for part, desired in zip(slices, desired_inertias, strict=True)
+    )
+    constant = tuple(desired is not None for desired in desired_inertias)
+    return TaskDynamics(
+        state.M, state.C, state.g, task.J, task.J_rate, S, MS, inertia, slices, inertias, constant
+    )
+
+
+def commanded_acceleration(
+    law: str, dynamics: TaskDynamics, error: TaskError, impedance: Impedance
+) -> Array:
+    """Task acceleration that a law asks for, shape (n,): the fast form."""
+    pull = impedance.damping * error.e_rate + impedance.force(error.e) - error.force
+    if law == "natural":
+        drift = natural_coriolis_force(dynamics, error.e_rate)
+        return error.reference_acceleration - np.linalg.solve(dynamics.inertia, drift + pull)
+    if law == "paper":
+        drift = paper_coriolis_force(dynamics, error.e_rate)
+    else:
+        drift = coriolis_force(dynamics, error.e_rate)
+    return error.reference_acceleration - divide_by_inertias(dynamics, drift + pull)
+
+
+def joint_acceleration(dynamics: TaskDynamics, v: Array, task_acceleration: Array) -> Array:
+    """Joint acceleration S (a - J_rate v) that gives a task acceleration, shape (n,)."""
+    return dynamics.S @ (task_acceleration - dynamics.J_rate @ v)
+
+
+def torque_of(dynamics: TaskDynamics, v: Array, joint_acceleration: Array) -> Array:
+    """M a + C v + g, shape (n,) [N or N m]."""
+    return dynamics.M @ joint_acceleration + dynamics.C @ v + dynamics.g
+
+
+def coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
+    """C~_i e_rate_i of every subtask with C~_i = S_i' (C S_i + M dS_i/dt), shape (n,)."""
+    U = _spread_by_subtask(dynamics, e_rate)
+    W = dynamics.C @ U - dynamics.MS @ (dynamics.J_rate @ U)  # dS/dt = -S J_rate S
+    blocks = dynamics.S.T @ W
+    force = np.zeros_like(e_rate)
+    for i, part in enumerate(dynamics.slices):
+        if not dynamics.constant[i]:
+            force[part] = blocks[part, i]
+    return force
+
+
+def paper_coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
+    """C_s,ii e_rate_i of every subtask, as Theorem 2 has it, shape (n,)."""
+    U = _spread_by_subtask(dynamics, e_rate)
+    blocks = dynamics.J @ np.linalg.solve(dynamics.M, dynamics.C @ U) - dynamics.J_rate @ U
+    force = np.empty_like(e_rate)
+    for i, part in enumerate(dynamics.slices):
+        force[part] = dynamics.inertias[i] @ blocks[part, i]  # Eq. (25).
+    return force
+
+
+def natural_coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
+    """mu e_rate with mu = S' (C S + M dS/dt), shape (n,)."""
+    u = dynamics.S @ e_rate
+    return dynamics.S.T @ (dynamics.C @ u - dynamics.MS @ (dynamics.J_rate @ u))
+
+
+def _spread_by_subtask(dynamics: TaskDynamics, e_rate: Array) -> Array:
+    """Columns S_i e_rate_i, shape (n, number of subtasks)."""
+    columns = np.zeros((len(e_rate), len(dynamics.slices)))
+    for i, part in enumerate(dynamics.slices):
+        columns[part, i] = e_rate[part]
+    return dynamics.S @ columns
+
+
+def divide_by_inertias(dynamics: TaskDynamics, force: Array) -> Array:
+    """M_i^-1 f_i of every subtask, shape (n,)."""
+    result = np.empty_like(force)
+    for part, inertia in zip(dynamics.slices, dynamics.inertias, strict=True):
+        result[part] = np.linalg.solve(inertia, force[part])
+    return result
+
+
+def multiply_by_inertias(dynamics: TaskDynamics, acceleration: Array) -> Array:
+    """M_i a_i of every subtask, shape (n,)."""
+    result = np.empty_like(acceleration)
+    for part, inertia in zip(dynamics.slices, dynamics.inertias, strict=True):
+        result[part] = inertia @ acceleration[part]
+    return result
+
+
+def decoupled_external_force(dynamics: TaskDynamics, external_torque: Array) -> Array:
+    """tau~e = Gamma^-1 tau_e = M_s J M^-1 tau_e, shape (n,) [N]."""
+    acceleration = dynamics.J @ np.linalg.solve(dynamics.M, external_torque)
+    return multiply_by_inertias(dynamics, acceleration)

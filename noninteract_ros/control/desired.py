@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The desired motion of one subtask: continuous whoever asks for it, and at rest when nobody does.
+
+Set-points, rates, take-overs and stops are shaped by ruckig within bounds of velocity,
+acceleration and jerk. A full reference passes unchanged once it has been taken over.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from ruckig import ControlInterface, InputParameter, OutputParameter, Result, Ruckig
+
+from noninteract_ros.control.inputs import Motion, Rate, Target
+from noninteract_ros.control.reference import Reference
+
+Array = NDArray[np.float64]
+
+
+class Shaper:
+    """One step at a time towards a state, within limits.
+
+    Args:
+        limits: Bounds of velocity, acceleration and jerk, shape (3, p).
+    """
+
+    def __init__(self, limits: Array) -> None:
+        dim = limits.shape[1]
+        self._generator = Ruckig(dim, 1.0)
+        self._input, self._output = InputParameter(dim), OutputParameter(dim)
+        self._input.max_velocity, self._input.max_acceleration, self._input.max_jerk = limits
+        self._max_velocity = limits[0]
+
+    def towards(self, start: Reference, target: Target, step: float) -> tuple[Reference, bool]:
+        """State `step` seconds on the way to a set-point, and whether it is reached."""
+        self._input.control_interface = ControlInterface.Position
+        self._input.target_position = target.position
+        return self._advance(start, target.velocity, step)
+
+    def at_rate(self, start: Reference, rate: Array, step: float) -> tuple[Reference, bool]:
+        """State `step` seconds on the way to a velocity, and whether it is reached."""
+        self._input.control_interface = ControlInterface.Velocity
+        return self._advance(start, rate, step)
+
+    def _advance(self, start: Reference, speed: Array, step: float) -> tuple[Reference, bool]:
+        self._generator.delta_time = step
+        self._input.current_position = start.position
+        self._input.current_velocity = start.velocity
+        self._input.current_acceleration = start.acceleration
+        self._input.target_velocity = np.clip(speed, -self._max_velocity, self._max_velocity)
+        result = self._generator.update(self._input, self._output)
+        if result not in (Result.Working, Result.Finished):
+            raise ArithmeticError(f"no trajectory from {start} within the limits: {result}")
+        reached = Reference(
+            np.array(self._output.new_position),
+            np.array(self._output.new_velocity),
+            np.array(self._output.new_acceleration),
+        )
+        return reached, result == Result.Finished
+
+
+class DesiredMotion:
+    """What a subtask is to do now.
+
+    Args:
+        limits: Bounds of velocity, acceleration and jerk, shape (3, p).
+        direct: Whether a full reference is taken over at once, with the jump it brings, instead
+            of being approached from where the desired motion is.
+    """
+
+    def __init__(self, limits: Array, direct: bool) -> None:
+        dim = limits.shape[1]
+        self._limits, self._direct = limits, direct
+        self._shaper = Shaper(limits)
+        self._zero = Target(np.zeros(dim), np.zeros(dim))
+        self.rest_at(np.zeros(dim))
+
+    @property
+    def now(self) -> Reference:
+        """Desired position, velocity and acceleration at the last tick."""
+        return self._now
+
+    def rest_at(self, x: Array) -> None:
+        """Starts anew: at rest at x, shape (p,)."""
+        self._now = Reference.still(x.copy())
+        self._followed: Reference | None = None
+        self._gap: Reference | None = None
+
+    def advance(self, motion: Motion | None, step: float) -> Reference:
+        """Desired motion one tick later.
+
+        Args:
+            motion: What the source in force asks for (a full reference as of this tick), or None.
+            step: Time since the last tick [s].
+        """
+        if isinstance(motion, Reference):
+            self._now = self._follow(motion, step)
+            self._followed = motion
+            return self._now
+        self._followed = self._gap = None
+        if step > 0.0:
+            self._now = self._shape(motion, step)
+        return self._now
+
+    def _shape(self, motion: Target | Rate | None, step: float) -> Reference:
+        if isinstance(motion, Target):
+            shaped, done = self._shaper.towards(self._now, motion, step)
+            arrived = done and not motion.velocity.any()
+            return Reference.still(motion.position) if arrived else shaped
+        if isinstance(motion, Rate):
+            return self._shaper.at_rate(self._now, motion.velocity, step)[0]
+        if not (self._now.velocity.any() or self._now.acceleration.any()):
+            return self._now
+        shaped, done = self._shaper.at_rate(self._now, self._zero.velocity, step)
+        return Reference.still(shaped.position) if done else shaped
+
+    def _follow(self, motion: Reference, step: float) -> Reference:
+        """The reference plus a gap that closes smoothly; no gap in a direct take-over."""
+        if self._direct:
+            return motion
+        if self._jumps(motion, step):
+            self._gap = _difference(self._now.at(step), motion)
+        elif self._gap is not None:
+            self._gap, closed = self._shaper.towards(self._gap, self._zero, step)
+            if closed:
+                self._gap = None
+        return motion if self._gap is None else _sum(motion, self._gap)
+
+    def _jumps(self, motion: Reference, step: float) -> bool:
+        """Whether a reference is new or leaves its own path by more than the limits allow."""
+        if self._followed is None:
+            return True
+        gap = _difference(motion, self._followed.at(step))
+        max_velocity, max_acceleration, _ = self._limits
+        return bool(
+            (np.abs(gap.position) > max_velocity * step).any()
+            or (np.abs(gap.velocity) > max_acceleration * step).any()
+        )
+
+
+def _difference(a: Reference, b: Reference) -> Reference:
+    return Reference(
+        a.position - b.position, a.velocity - b.velocity, a.acceleration - b.acceleration
+    )
+
+
+def _sum(a: Reference, b: Reference) -> Reference:
+    return Reference(
+        a.position + b.position, a.velocity + b.velocity, a.acceleration + b.acceleration
+    )

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Who leads a subtask: authority, silence and the desired motion that results."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from noninteract_ros.control.desired import DesiredMotion
+from noninteract_ros.control.impedance import Array, spread
+from noninteract_ros.control.inputs import SOURCES, Motion, Source
+from noninteract_ros.control.reference import Reference
+from noninteract_ros.schema import key
+from noninteract_ros.subtasks.subtask import Subtask
+
+AUTHORITIES = (*SOURCES, "hold")
+
+
+@dataclass(frozen=True)
+class InputSettings:
+    """Configuration of how one subtask is led."""
+
+    authority: str = key("Source in force", "hold", choices=AUTHORITIES, live=True)
+    timeout: float = key("Silence after which the subtask holds [s]", 0.5, positive=True)
+    takeover: str = key(
+        "How a full reference is taken over: shaped from where the desired motion is, or direct,"
+        " with the jump it brings",
+        "shaped",
+        choices=("shaped", "direct"),
+    )
+    max_velocity: tuple[float, ...] = key(
+        "Velocity bound of shaped motions [m/s]", (1.0,), positive=True
+    )
+    max_acceleration: tuple[float, ...] = key(
+        "Acceleration bound of shaped motions [m/s^2]", (5.0,), positive=True
+    )
+    max_jerk: tuple[float, ...] = key(
+        "Jerk bound of shaped motions [m/s^3]", (50.0,), positive=True
+    )
+    max_wrench: tuple[float, ...] = key("Bound of a force input [N]", (50.0,), positive=True)
+    max_wrench_rate: tuple[float, ...] = key(
+        "Rate bound of a force input [N/s]", (500.0,), positive=True
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Led:
+    """What a subtask is asked to do at one tick.
+
+    Attributes:
+        reference: Desired motion.
+        force: Force input in force, shape (p,) [N].
+        source: Source that is followed, or `hold`.
+        silent: Whether the source in force has gone silent, or never spoke.
+    """
+
+    reference: Reference
+    force: Array
+    source: str
+    silent: bool
+
+
+class SubtaskInput:
+    """Sources, authority and desired motion of one subtask.
+
+    Attributes:
+        authority: Source in force; may be changed at any time.
+        sources: Inputs by source.
+    """
+
+    def __init__(self, subtask: Subtask, settings: InputSettings) -> None:
+        self.authority = settings.authority
+        self.sources = {name: Source() for name in SOURCES}
+        self._timeout = settings.timeout
+        names = ("max_velocity", "max_acceleration", "max_jerk")
+        limits = np.array([spread(subtask, name, getattr(settings, name)) for name in names])
+        self._desired = DesiredMotion(limits, settings.takeover == "direct")
+        self._max_force = spread(subtask, "max_wrench", settings.max_wrench)
+        self._max_force_rate = spread(subtask, "max_wrench_rate", settings.max_wrench_rate)
+        self._force = np.zeros(subtask.dim)
+
+    def rest_at(self, x: Array) -> None:
+        """Holds at x, shape (p,), until the source in force speaks again."""
+        self._desired.rest_at(x)
+        self._force = np.zeros_like(x)
+
+    def resting(self) -> Led:
+        """At rest where it is, whatever the sources say."""
+        return Led(self._desired.now, self._force, "hold", False)
+
+    def forget(self) -> None:
+        """Drops every input that has come so far."""
+        for source in self.sources.values():
+            source.forget()
+
+    def reset(self) -> None:
+        """Starts anew with sources that have never spoken."""
+        self.sources.update({name: Source() for name in SOURCES})
+
+    def advance(self, now: float, step: float) -> Led:
+        """What to do at this tick.
+
+        Args:
+            now: The team's time [s].
+            step: Time since the last tick [s].
+        """
+        for source in self.sources.values():
+            source.motion(now)
+            source.force(now)
+        motion = self._motion(now)
+        self._force = self._shaped_force(now, step)
+        silent = motion is None and self.authority != "hold"
+        reference = self._desired.advance(motion, step)
+        return Led(reference, self._force, self.authority, silent)
+
+    def _motion(self, now: float) -> Motion | None:
+        if self.authority == "hold":
+            return None
+        newest = self.sources[self.authority].motion(now)
+        if newest is None or now - newest[0] > self._timeout:
+            return None
+        stamp, motion = newest
+        return motion.at(now - stamp) if isinstance(motion, Reference) else motion
+
+    def _shaped_force(self, now: float, step: float) -> Array:
+        wanted = np.zeros_like(self._force)
+        if self.authority != "hold":
+            newest = self.sources[self.authority].force(now)
+            if newest is not None and now - newest[0] <= self._timeout:
+                wanted = np.clip(newest[1].force, -self._max_force, self._max_force)
+        change = self._max_force_rate * step
+        return self._force + np.clip(wanted - self._force, -change, change)

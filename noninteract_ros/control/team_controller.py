@@ -1,0 +1,253 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The controller of a team, without ROS: states and inputs in, torques and accounts out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from noninteract_ros.control.decoupling import (
+    TaskDynamics,
+    TaskError,
+    commanded_acceleration,
+    joint_acceleration,
+    task_dynamics,
+)
+from noninteract_ros.control.energy import Energy, energy
+from noninteract_ros.control.impedance import Array, Impedance, ImpedanceSettings, stack_impedance
+from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.subtasks.subtask import SubtaskState
+from noninteract_ros.team.team import Team, TeamState
+
+JUMP = 0.1  # [m or rad] a coordinate that moves further in one tick has been put elsewhere
+
+
+@dataclass(frozen=True)
+class Mode:
+    """How the torque is made; a change is bumpless.
+
+    Attributes:
+        law: One of `decoupling.LAWS`.
+        impedance: Gains of all subtasks.
+        stopped: Damps to rest instead of following the law.
+    """
+
+    law: str
+    impedance: Impedance
+    stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Everything that one step of the controller found and decided.
+
+    Attributes:
+        torque: Control torque, shape (n,) [N or N m].
+        task: Actual subtask values and Jacobians.
+        x_rate: Actual subtask velocities, shape (n,) [m/s].
+        error: Tracking state of the subtasks.
+        led: What each subtask is asked to do.
+        dynamics: Task dynamics at the state.
+        task_acceleration: Commanded task acceleration, shape (n,) [m/s^2].
+        feedback: Coupling force D e_rate + h(e) of each subtask, which an operator's device
+            feels, shape (n,) [N].
+        restarted: Why every subtask was put to rest where it is, or an empty text.
+    """
+
+    torque: Array
+    task: SubtaskState
+    x_rate: Array
+    error: TaskError
+    led: tuple[Led, ...]
+    dynamics: TaskDynamics
+    task_acceleration: Array
+    feedback: Array
+    restarted: str
+
+
+class TeamController:
+    """Leads a team's subtasks: decoupling, impedance, authority, bumpless changes.
+
+    Args:
+        team: The robots.
+        stack: Their subtasks.
+        law: One of `decoupling.LAWS`.
+        impedances: Gains, by subtask in the stack's order.
+        inputs: Authority, timeouts and limits, in the same order.
+        transition_time: How long a change of law or gains fades in [s].
+        stop_rate: Decay rate of the velocity after a stop [1/s].
+        state_timeout: Gap between states after which every subtask starts anew [s].
+    """
+
+    def __init__(
+        self,
+        team: Team,
+        stack: SubtaskStack,
+        law: str,
+        impedances: Sequence[ImpedanceSettings],
+        inputs: Sequence[InputSettings],
+        transition_time: float = 0.2,
+        stop_rate: float = 10.0,
+        state_timeout: float = 0.2,
+    ) -> None:
+        self.team, self.stack = team, stack
+        self._settings = list(impedances)
+        self.inputs: Mapping[str, SubtaskInput] = {
+            task.name: SubtaskInput(task, settings)
+            for task, settings in zip(stack.subtasks, inputs, strict=True)
+        }
+        self._mode = Mode(law, stack_impedance(stack.subtasks, impedances))
+        self._left: Mode | None = None
+        self._transition_time, self._stop_rate = transition_time, stop_rate
+        self._state_timeout = state_timeout
+        self._bump, self._bump_start = np.zeros(team.n), -np.inf
+        self._last: tuple[float, Array] | None = None
+
+    @property
+    def mode(self) -> Mode:
+        """Law, gains and stop in force."""
+        return self._mode
+
+    def set_law(self, law: str) -> None:
+        """Changes the law without a bump."""
+        self._change(replace(self._mode, law=law))
+
+    def set_impedance(self, subtask: str, settings: ImpedanceSettings) -> None:
+        """Changes one subtask's gains without a bump.
+
+        Raises:
+            ScenarioError: The gains do not fit the subtask; nothing is changed.
+        """
+        changed = list(self._settings)
+        changed[self.stack.names.index(subtask)] = settings
+        self._change(replace(self._mode, impedance=stack_impedance(self.stack.subtasks, changed)))
+        self._settings = changed
+
+    def set_authority(self, subtask: str, authority: str) -> None:
+        """Hands one subtask to another source without a bump."""
+        self.inputs[subtask].authority = authority
+
+    def stop(self) -> None:
+        """Damps the team to rest and ignores every input until `resume`."""
+        self._change(replace(self._mode, stopped=True))
+
+    def resume(self) -> None:
+        """Leaves a stop: every subtask holds where it is until it hears from its source."""
+        for item in self.inputs.values():
+            item.forget()
+        self._change(replace(self._mode, stopped=False))
+
+    def reset(self) -> None:
+        """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
+        self._last = None
+        self._bump_start = -np.inf
+        for item in self.inputs.values():
+            item.reset()
+
+    def _change(self, mode: Mode) -> None:
+        self._left = self._left or self._mode
+        self._mode = mode
+
+    def step(self, now: float, q: Array, v: Array) -> Tick:
+        """Torque for the time from `now` to the next tick.
+
+        Args:
+            now: Time of the state [s]; later than at the last step.
+            q: Configuration, shape (nq,).
+            v: Velocity, shape (n,).
+        """
+        state = self.team.state(q, v)
+        task = self.stack.evaluate(state)
+        restarted = self._restart_reason(now, q)
+        step = 0.0 if restarted or self._last is None else now - self._last[0]
+        if restarted or self._mode.stopped or (self._left and self._left.stopped):
+            self._rest_at(task.x)
+        led = tuple(
+            item.resting() if self._mode.stopped else item.advance(now, step)
+            for item in self.inputs.values()
+        )
+        error = _error(task, v, led)
+        dynamics = task_dynamics(state, task, self.stack.slices, self._mode.impedance.inertias)
+        acceleration = self._acceleration(now, state, task, error, dynamics)
+        wanted = joint_acceleration(dynamics, v, acceleration)
+        torque = self.team.inverse_dynamics(q, v, wanted)
+        self._last = (now, q)
+        x_rate = error.e_rate + error.reference_velocity
+        feedback = self._mode.impedance.damping * error.e_rate + self._mode.impedance.force(error.e)
+        return Tick(
+            torque, task, x_rate, error, led, dynamics, acceleration, feedback, restarted
+        )
+
+    def energy(self, tick: Tick, external_torque: Array) -> Energy:
+        """Storage functions (32) and their rates (33) of a tick.
+
+        Args:
+            tick: What `step` returned.
+            external_torque: tau_e on the joints, shape (n,) [N or N m].
+        """
+        return energy(
+            tick.dynamics,
+            tick.error,
+            self._mode.impedance,
+            tick.task_acceleration,
+            external_torque,
+        )
+
+    def _restart_reason(self, now: float, q: Array) -> str:
+        if self._last is None:
+            return "the first state"
+        last, q_last = self._last
+        if now - last > self._state_timeout:
+            return f"no state for {now - last:.3f} s"
+        moved = np.abs(q - q_last)
+        if moved.max() > JUMP:
+            joint = self.team.joint_names[int(moved.argmax())]
+            return f"{joint} jumped by {moved.max():.3f}"
+        return ""
+
+    def _rest_at(self, x: Array) -> None:
+        for item, part in zip(self.inputs.values(), self.stack.slices, strict=True):
+            item.rest_at(x[part])
+
+    def _acceleration(
+        self,
+        now: float,
+        state: TeamState,
+        task: SubtaskState,
+        error: TaskError,
+        dynamics: TaskDynamics,
+    ) -> Array:
+        """Task acceleration in force, with the bump of the last change fading out."""
+        wanted = self._wanted(self._mode, state, task, error, dynamics)
+        if self._left is not None:
+            left = task_dynamics(state, task, self.stack.slices, self._left.impedance.inertias)
+            before = self._wanted(self._left, state, task, error, left) + self._fading(now)
+            self._bump, self._bump_start, self._left = before - wanted, now, None
+        return wanted + self._fading(now)
+
+    def _fading(self, now: float) -> Array:
+        progress = (now - self._bump_start) / self._transition_time
+        if progress >= 1.0:
+            return np.zeros_like(self._bump)
+        return self._bump * (1.0 - progress) ** 2 * (1.0 + 2.0 * progress)
+
+    def _wanted(
+        self,
+        mode: Mode,
+        state: TeamState,
+        task: SubtaskState,
+        error: TaskError,
+        dynamics: TaskDynamics,
+    ) -> Array:
+        if mode.stopped:
+            return task.J @ (-self._stop_rate * state.v) + task.J_rate @ state.v
+        return commanded_acceleration(mode.law, dynamics, error, mode.impedance)
+
+
+def _error(task: SubtaskState, v: Array, led: Sequence[Led]) -> TaskError:
+    position = np.concatenate([item.reference.position for item in led])
+    velocity = np.concatenate([item.reference.velocity for item in led])
+    acceleration = np.concatenate([item.reference.acceleration for item in led])
+    force = np.concatenate([item.force for item in led])
+    return TaskError(task.x - position, task.J @ v - velocity, velocity, acceleration, force)

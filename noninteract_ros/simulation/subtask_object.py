@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The object of the paper's Section V: a mass and a stiffness at subtask level."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from noninteract_ros.control.decoupling import task_dynamics
+from noninteract_ros.control.plain_form import decoupling_matrix
+from noninteract_ros.errors import ScenarioError, one_of
+from noninteract_ros.schema import key
+from noninteract_ros.simulation.integrator import Array
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.team.team import TeamState
+
+SIGNS = {"physical": -1.0, "paper": 1.0}
+
+
+@dataclass(frozen=True)
+class ObjectSettings:
+    """Configuration block of the object that the team holds."""
+
+    mass: float = key("Mass m_o that the carrying subtask moves [kg]", 0.0, minimum=0.0)
+    stiffness: float = key("Stiffness k_o that the grasping subtask strains [N/m]", 0.0, minimum=0)
+    rest: tuple[float, ...] = key("Value of the grasping subtask without strain [m]", ())
+    carried_by: str = key("Subtask that carries the mass", "cooperative")
+    grasped_by: str = key("Subtask that strains the stiffness", "relative")
+    sign: str = key(
+        "physical: inertia and spring oppose the motion; paper: the sign that Section V prints",
+        "physical",
+        choices=tuple(SIGNS),
+    )
+
+
+class SubtaskObject:
+    """tau~_c = s m_o dv_c/dt and tau~_r = s k_o (x_r - rest), applied as tau_e = Gamma tau~_e.
+
+    Args:
+        settings: Mass, stiffness, rest value and sign s.
+        stack: The team's subtasks.
+
+    Raises:
+        ScenarioError: A subtask is unknown or `rest` does not fit it.
+    """
+
+    def __init__(self, settings: ObjectSettings, stack: SubtaskStack) -> None:
+        for name in ("carried_by", "grasped_by"):
+            found = getattr(settings, name)
+            if found not in stack.names:
+                raise ScenarioError(f"object.{name}", repr(found), one_of(stack.names, found))
+        self._stack = stack
+        self._natural = (None,) * len(stack.names)
+        self._carrying = stack.slices[stack.names.index(settings.carried_by)]
+        self._grasping = stack.slices[stack.names.index(settings.grasped_by)]
+        dim = self._grasping.stop - self._grasping.start
+        if settings.stiffness and len(settings.rest) != dim:
+            raise ScenarioError("object.rest", list(settings.rest), f"{dim} numbers")
+        sign = SIGNS[settings.sign]
+        self._mass, self._stiffness = sign * settings.mass, sign * settings.stiffness
+        self._rest = np.array(settings.rest) if settings.stiffness else np.zeros(dim)
+
+    def torque_terms(self, state: TeamState) -> tuple[Array, Array]:
+        """A (n, n) and b (n,) of its torque A dv/dt + b: the mass feels the acceleration."""
+        task = self._stack.evaluate(state)
+        dynamics = task_dynamics(state, task, self._stack.slices, self._natural)
+        gamma = decoupling_matrix(dynamics)
+        carried = self._mass * gamma[:, self._carrying]
+        strain = self._stiffness * (task.x[self._grasping] - self._rest)
+        A = carried @ task.J[self._carrying]
+        b = carried @ (task.J_rate[self._carrying] @ state.v) + gamma[:, self._grasping] @ strain
+        return A, b

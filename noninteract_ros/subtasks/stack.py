@@ -1,0 +1,78 @@
+# SPDX-License-Identifier: Apache-2.0
+"""All subtasks of a team stacked: equation (6) and assumptions 1 to 3."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from noninteract_ros.errors import SubtaskError
+from noninteract_ros.subtasks.subtask import Array, Subtask, SubtaskState
+from noninteract_ros.team.team import Team, TeamState
+
+_RANK_TRIALS = 4
+
+
+class SubtaskStack:
+    """The outputs of the whole team; together they leave no internal dynamics.
+
+    Args:
+        team: The robots.
+        subtasks: Subtasks with different names, whose coordinates add up to the team's.
+
+    Raises:
+        SubtaskError: Assumption 1, 2 or 3 does not hold; the text gives the dimensions.
+    """
+
+    def __init__(self, team: Team, subtasks: Sequence[Subtask]) -> None:
+        self.subtasks = tuple(subtasks)
+        self.names = tuple(subtask.name for subtask in subtasks)
+        if len(set(self.names)) != len(self.names):
+            raise SubtaskError(f"each subtask needs a name of its own, found {list(self.names)}")
+        self._check_count(team.n)
+        ends = np.cumsum([subtask.dim for subtask in subtasks]).tolist()
+        self.slices = tuple(
+            slice(end - subtask.dim, end) for end, subtask in zip(ends, subtasks, strict=True)
+        )
+        self._check_rank(team)
+
+    def evaluate(self, state: TeamState) -> SubtaskState:
+        """Stacked value (n,), Jacobian (n, n) and Jacobian rate (n, n)."""
+        parts = [subtask.evaluate(state) for subtask in self.subtasks]
+        return SubtaskState(
+            np.concatenate([part.x for part in parts]),
+            np.concatenate([part.J for part in parts]),
+            np.concatenate([part.J_rate for part in parts]),
+        )
+
+    def _check_count(self, n: int) -> None:
+        """Assumption 2; fewer coordinates would leave internal dynamics, assumption 1."""
+        total = sum(subtask.dim for subtask in self.subtasks)
+        if total == n:
+            return
+        terms = " + ".join(f"{subtask.dim} ({subtask.name})" for subtask in self.subtasks)
+        broken = "1 and 2 (internal dynamics)" if total < n else "2 (too many goals)"
+        raise SubtaskError(
+            f"assumption {broken}: the subtasks have {terms} = {total} coordinates, "
+            f"the team has {n}"
+        )
+
+    def _jacobian(self, team: Team, step: Array) -> Array:
+        return self.evaluate(team.state(team.integrate(team.q0, step), np.zeros(team.n))).J
+
+    def _check_rank(self, team: Team) -> None:
+        """Assumption 3, structurally: full rank at one configuration at least."""
+        rng = np.random.default_rng(0)
+        steps = [np.zeros(team.n), *rng.uniform(-0.5, 0.5, (_RANK_TRIALS, team.n))]
+        Js = [self._jacobian(team, step) for step in steps]
+        ranks = [int(np.linalg.matrix_rank(J)) for J in Js]
+        if max(ranks) == team.n:
+            return
+        best = Js[int(np.argmax(ranks))]
+        own = ", ".join(
+            f"{name} {np.linalg.matrix_rank(best[part])} of {part.stop - part.start}"
+            for name, part in zip(self.names, self.slices, strict=True)
+        )
+        raise SubtaskError(
+            f"assumption 3: the stacked Jacobian has rank {max(ranks)} of {team.n} "
+            f"(by subtask: {own}); the subtasks depend on each other"
+        )

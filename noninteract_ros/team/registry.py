@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The robot models that a scenario can name."""
+
+from typing import Protocol
+
+from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.robot import Robot
+
+
+class RobotBlock(Protocol):
+    """Configuration of one robot: a dataclass of `schema.key` fields that builds it."""
+
+    def build(self, name: str) -> Robot:
+        """The robot."""
+
+
+ROBOT_MODELS: dict[str, type[RobotBlock]] = {"point_mass": PointMass}

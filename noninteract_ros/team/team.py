@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A robot team as one Pinocchio model: equations (1) to (3)."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from noninteract_ros.errors import TeamError
+from noninteract_ros.team.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class TeamState:
+    """Everything the law needs to know of the team at one state (q, v).
+
+    Attributes:
+        q: Configuration, shape (nq,).
+        v: Velocity, shape (n,) [m/s or rad/s].
+        M: Inertia matrix, shape (n, n), symmetric positive-definite.
+        C: Coriolis matrix, shape (n, n); dM/dt - 2 C is skew.
+        g: Gravity torque, shape (n,) [N or N m].
+        tool_positions: Tool points in the world, shape (N, 3) [m].
+        tool_jacobians: Tool twists (linear, angular) in world axes per v, shape (N, 6, n).
+        tool_jacobian_rates: Their time derivatives, shape (N, 6, n).
+    """
+
+    q: Array
+    v: Array
+    M: Array
+    C: Array
+    g: Array
+    tool_positions: Array
+    tool_jacobians: Array
+    tool_jacobian_rates: Array
+
+
+class Team:
+    """N robots joined into one model; joints are named `<robot>/<joint>`.
+
+    Args:
+        robots: At least two robots with different names.
+        gravity: Gravitational acceleration in the world, shape (3,) [m/s^2].
+
+    Raises:
+        TeamError: Fewer than two robots, or a name twice.
+    """
+
+    def __init__(
+        self, robots: Sequence[Robot], gravity: Sequence[float] = (0.0, 0.0, -9.81)
+    ) -> None:
+        names = [robot.name for robot in robots]
+        if len(robots) < 2:
+            raise TeamError(f"a team has at least 2 robots, found {len(robots)}: {names}")
+        if len(set(names)) != len(names):
+            raise TeamError(f"each robot needs a name of its own, found {names}")
+        self.robots = tuple(robots)
+        self.names = tuple(names)
+        self.model = _join(robots)
+        self.model.gravity.linear = np.array(gravity)
+        self.n = self.model.nv
+        self.joint_names = tuple(self.model.names[1:])
+        self.q0 = np.concatenate([robot.initial_position for robot in robots])
+        self.velocity_slices = self._slices([robot.model.nv for robot in robots])
+        self.brake_damping = np.concatenate(
+            [np.full(robot.model.nv, robot.brake_damping) for robot in robots]
+        )
+        self._data = self.model.createData()
+        self._tools = [self.model.getFrameId(f"{r.name}/{r.tool_frame}") for r in robots]
+        self._no_velocity = np.zeros(self.n)
+
+    @staticmethod
+    def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
+        ends = np.cumsum(sizes).tolist()
+        return tuple(slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
+
+    def state(self, q: Array, v: Array) -> TeamState:
+        """Dynamics and tool kinematics at (q, v); the arrays are new at each call."""
+        model, data = self.model, self._data
+        pin.computeAllTerms(model, data, q, v)
+        pin.computeJointJacobiansTimeVariation(model, data, q, v)
+        M = np.triu(data.M)
+        M += np.triu(M, 1).T
+        C = pin.computeCoriolisMatrix(model, data, q, v).copy()
+        g = pin.computeGeneralizedGravity(model, data, q).copy()
+        count = len(self._tools)
+        positions = np.empty((count, 3))
+        jacobians = np.empty((count, 6, self.n))
+        rates = np.empty((count, 6, self.n))
+        axes = pin.LOCAL_WORLD_ALIGNED
+        for i, tool in enumerate(self._tools):
+            positions[i] = pin.updateFramePlacement(model, data, tool).translation
+            jacobians[i] = pin.getFrameJacobian(model, data, tool, axes)
+            rates[i] = pin.getFrameJacobianTimeVariation(model, data, tool, axes)
+        return TeamState(q, v, M, C, g, positions, jacobians, rates)
+
+    def inverse_dynamics(self, q: Array, v: Array, acceleration: Array) -> Array:
+        """Torque M a + C v + g for a joint acceleration, shape (n,) [N or N m]."""
+        return pin.rnea(self.model, self._data, q, v, acceleration).copy()
+
+    def forward_dynamics(self, q: Array, v: Array, torque: Array) -> Array:
+        """Acceleration M^-1 (torque - C v - g), shape (n,): equation (3)."""
+        return pin.aba(self.model, self._data, q, v, torque).copy()
+
+    def gravity(self, q: Array) -> Array:
+        """Gravity torque g(q), shape (n,) [N or N m]."""
+        return pin.computeGeneralizedGravity(self.model, self._data, q).copy()
+
+    def mechanical_energy(self, q: Array, v: Array) -> float:
+        """Kinetic plus potential energy [J]."""
+        return float(pin.computeMechanicalEnergy(self.model, self._data, q, v))
+
+    def integrate(self, q: Array, step: Array) -> Array:
+        """Configuration reached from q along the tangent vector `step`, shape (n,)."""
+        return pin.integrate(self.model, q, step)
+
+    def tool_rotations(self, q: Array) -> Array:
+        """Tool orientations in the world, shape (N, 3, 3)."""
+        pin.framesForwardKinematics(self.model, self._data, q)
+        return np.array([self._data.oMf[tool].rotation for tool in self._tools])
+
+    def external_torque(self, state: TeamState, wrenches: Array) -> Array:
+        """Joint torque of wrenches on the tools: sum of J_k' w_k, shape (n,).
+
+        Args:
+            state: Where the team is.
+            wrenches: Force and torque on each tool point, world axes, shape (N, 6) [N, N m].
+        """
+        return np.einsum("kin,ki->n", state.tool_jacobians, wrenches)
+
+    def tool_wrenches(self, state: TeamState, torque: Array) -> Array:
+        """Smallest wrench on each tool that gives a joint torque, shape (N, 6) [N, N m]."""
+        wrenches = np.empty((len(self.robots), 6))
+        for i, part in enumerate(self.velocity_slices):
+            J = state.tool_jacobians[i][:, part]
+            wrenches[i] = np.linalg.lstsq(J.T, torque[part])[0]
+        return wrenches
+
+    def index(self, name: str) -> int:
+        """Position of a robot in the team.
+
+        Raises:
+            TeamError: No robot has this name.
+        """
+        if name not in self.names:
+            raise TeamError(f"no robot is called {name!r}; the team has {list(self.names)}")
+        return self.names.index(name)
+
+
+def _join(robots: Sequence[Robot]) -> pin.Model:
+    """One model: every joint and frame is prefixed with its robot's name."""
+    team = pin.Model()
+    team.name = "team"
+    for robot in robots:
+        part = robot.model.copy()
+        for joint in range(1, part.njoints):
+            part.names[joint] = f"{robot.name}/{part.names[joint]}"
+        for index in range(1, part.nframes):
+            frame = part.frames[index]
+            frame.name = f"{robot.name}/{frame.name}"
+        team = pin.appendModel(team, part, 0, pin.SE3.Identity())
+    return team
