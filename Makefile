@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+# `make help` lists what there is.
+
+PYTHON ?= python3
+SCENARIO ?= paper
+ARGS ?=
+
+VENV := .venv
+BIN := $(VENV)/bin
+METADATA := setup.py setup.cfg pyproject.toml
+PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+
+# Discovery never leaves this machine, and small matrices gain nothing from more threads.
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+export OPENBLAS_NUM_THREADS ?= 1
+# The environment brings its own ROS: another one, if sourced, must not mix in.
+unexport PYTHONPATH AMENT_PREFIX_PATH RMW_IMPLEMENTATION
+
+SUPPORTED = import sys; print(sys.version_info[:2] in ((3, 11), (3, 12)))
+
+.DEFAULT_GOAL := help
+.PHONY: help venv demo test lint format bench clean
+
+help: ## list the targets
+	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
+
+$(BIN)/python:
+	$(if $(filter True,$(shell $(PYTHON) -c '$(SUPPORTED)' 2>&1 || :)),,$(error Python 3.11 or 3.12 \
+	is needed, but PYTHON=$(PYTHON) says: $(shell $(PYTHON) --version 2>&1 || :)))
+	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
+
+# A stamp per kind of install; the one for development holds everything of the other.
+$(VENV)/installed: $(METADATA) | $(BIN)/python
+	@echo "Installing into $(VENV): about a minute and 1 GB the first time"
+	$(PIP_INSTALL) --editable .
+	@touch $@
+
+$(VENV)/installed-dev: $(METADATA) | $(BIN)/python
+	@echo "Installing into $(VENV): about a minute and 1 GB the first time"
+	$(PIP_INSTALL) --editable '.[dev]'
+	@touch $(VENV)/installed $@
+
+venv: $(VENV)/installed-dev ## make .venv with the package (editable) and the developers' tools
+
+demo: $(VENV)/installed ## run a scenario: make demo SCENARIO=paper ARGS='--duration 6'
+	$(BIN)/noninteract demo $(SCENARIO) $(ARGS)
+
+test: lint ## format check, lint, types and all tests
+	$(BIN)/python -m pytest -n 2 $(ARGS)
+
+lint: $(VENV)/installed-dev ## format check, lint and types
+	$(BIN)/ruff format --check
+	$(BIN)/ruff check
+	$(BIN)/mypy
+
+format: $(VENV)/installed-dev ## rewrite the sources in the project's format
+	$(BIN)/ruff check --fix-only
+	$(BIN)/ruff format
+
+bench: $(VENV)/installed ## measure the law, the controller and the lockstep
+	$(BIN)/noninteract bench $(ARGS)
+
+clean: ## remove all that make has made; recorded runs stay
+	rm -rf $(VENV) build install log dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

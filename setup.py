@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Build script of an ament_python package that plain pip installs as well."""
+
+from glob import glob
+
+from setuptools import find_packages, setup
+
+NAME = "noninteract_ros"
+NODES = ("robot_team", "haptic_emulator", "relative_planner", "controller", "recorder")
+PROGRAMS = {node: f"{NAME}.nodes.{node}:main" for node in NODES}
+PROGRAMS["noninteract"] = f"{NAME}.cli:main"
+
+setup(
+    name=NAME,
+    version="0.1.0",
+    description="Passive noninteracting control of robot teams led by a human",
+    license="Apache-2.0",
+    maintainer="The noninteract_ros maintainers",
+    maintainer_email="maintainers@example.org",
+    python_requires=">=3.11,<3.13",
+    packages=find_packages(include=[NAME, f"{NAME}.*"]),
+    package_data={NAME: ["py.typed"]},
+    data_files=[
+        ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+        (f"share/{NAME}", ["package.xml"]),
+        (f"share/{NAME}/config", sorted(glob("config/*.yaml"))),
+        (f"share/{NAME}/launch", sorted(glob("launch/*.py"))),
+        # pip puts entry points into bin/ only, while `ros2 run` looks into lib/<package>/.
+        (f"lib/{NAME}", [f"scripts/{program}" for program in PROGRAMS]),
+    ],
+    entry_points={"console_scripts": [f"{name} = {main}" for name, main in PROGRAMS.items()]},
+    install_requires=[
+        "ros-jazzy-rclpy[fastrtps]>=7.1.6",
+        "ros-jazzy-common-interfaces>=5.3.6",
+        "numpy>=2.4",
+        "pin>=4.1",
+        "pyyaml>=6.0",
+        "ruckig>=0.19",
+        "mcap>=1.6",
+        "mcap-ros2-support>=0.6",
+        "scipy>=1.17",
+        "matplotlib>=3.11",
+        "typer>=0.29",
+        "rich>=15.0",
+    ],
+    extras_require={
+        "dev": [
+            "ruff>=0.17,<0.18",  # Another minor release formats differently.
+            "mypy>=2.4",
+            "pytest>=9.2",
+            "pytest-xdist>=3.8",
+            "types-PyYAML>=6.0",
+            "colcon-common-extensions>=0.3",
+            "setuptools>=70.1,<80",  # 70.1 builds wheels by itself; colcon refuses 80.
+        ]
+    },
+)
