@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scenario: the one file that every program of a run is started with."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,7 +13,7 @@ from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_of
 from noninteract_ros.operator.haptic import HapticDevice, HapticSettings
 from noninteract_ros.operator.planner import Formation, FormationPlanner, PlannerSettings
-from noninteract_ros.schema import join, key, load
+from noninteract_ros.schema import Key, describe, join, key, load
 from noninteract_ros.simulation.push import ScheduledPush
 from noninteract_ros.simulation.subtask_object import ObjectSettings, SubtaskObject
 from noninteract_ros.simulation.team_simulation import TeamSimulation
@@ -44,7 +44,10 @@ class General:
         "Sources that the controller waits for in lockstep, as <subtask>/<source>", ()
     )
     lockstep_timeout: float = key(
-        "Wall time after which a lockstep source counts as absent [s]", 0.5, positive=True
+        "Wall time after which a lockstep source counts as absent [s]", 5.0, positive=True
+    )
+    force_sensors: tuple[str, ...] = key(
+        "Robots whose external_wrench the controller's energy account uses", ()
     )
     state_timeout: float = key(
         "Gap between states after which the controller starts anew [s]", 0.2, positive=True
@@ -118,6 +121,21 @@ class Scenario:
         scenario.check()
         return scenario
 
+    def keys(self) -> Iterator[tuple[str, Any, Key, Any]]:
+        """Dotted key, type, rule and value of every key of every block."""
+        yield from describe(self.general)
+        for blocks in (self.robots, self.pushes):
+            for name, block in blocks.items():  # type: ignore[attr-defined]
+                yield from describe(block, name)
+        for name, spec in self.subtasks.items():
+            for part in (spec.kind, spec.impedance, spec.input):
+                yield from describe(part, name)
+        optional = {"object": self.held, "haptic": self.haptic, "planner": self.planner}
+        formations = {f"planner.{name}": block for name, block in self.formations.items()}
+        for name, block in (optional | formations).items():
+            if block is not None:
+                yield from describe(block, name)
+
     def check(self) -> None:
         """Builds every part once, so that nothing is found wrong later.
 
@@ -130,6 +148,9 @@ class Scenario:
         for source in self.general.lockstep_sources:
             if source not in sources:
                 raise ScenarioError("lockstep_sources", repr(source), one_of(sources, source))
+        for robot in self.general.force_sensors:
+            if robot not in self.robots:
+                raise ScenarioError("force_sensors", repr(robot), one_of(self.robots, robot))
         team = self.build_team()
         stack = self.build_stack(team)
         self.build_controller(team, stack)

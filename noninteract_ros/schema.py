@@ -89,6 +89,14 @@ def keys_of(block: type) -> Iterator[Field]:
     return (item for item in fields(block) if "key" in item.metadata)
 
 
+def describe(block: Any, path: str = "") -> Iterator[tuple[str, Any, Key, Any]]:
+    """Dotted key, annotated type, rule and value of every key of a block."""
+    hints = get_type_hints(type(block))
+    for item in keys_of(type(block)):
+        rule = item.metadata["key"]
+        yield join(path, item.name), hints[item.name], rule, getattr(block, item.name)
+
+
 def join(path: str, name: str) -> str:
     """Dotted key."""
     return f"{path}.{name}" if path else name

@@ -44,6 +44,7 @@ class Tick:
 
     Attributes:
         torque: Control torque, shape (n,) [N or N m].
+        state: Team dynamics at the state.
         task: Actual subtask values and Jacobians.
         x_rate: Actual subtask velocities, shape (n,) [m/s].
         error: Tracking state of the subtasks.
@@ -56,6 +57,7 @@ class Tick:
     """
 
     torque: Array
+    state: TeamState
     task: SubtaskState
     x_rate: Array
     error: TaskError
@@ -176,7 +178,7 @@ class TeamController:
         x_rate = error.e_rate + error.reference_velocity
         feedback = self._mode.impedance.damping * error.e_rate + self._mode.impedance.force(error.e)
         return Tick(
-            torque, task, x_rate, error, led, dynamics, acceleration, feedback, restarted
+            torque, state, task, x_rate, error, led, dynamics, acceleration, feedback, restarted
         )
 
     def energy(self, tick: Tick, external_torque: Array) -> Energy:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from noninteract_ros.clock import seconds, tick_stamp
 from noninteract_ros.simulation.integrator import Array, runge_kutta_step
 from noninteract_ros.simulation.push import LivePush, ScheduledPush
 from noninteract_ros.simulation.subtask_object import SubtaskObject
@@ -47,7 +48,7 @@ class TeamSimulation:
     @property
     def now(self) -> float:
         """Time since the start [s]."""
-        return self.tick / self.rate
+        return seconds(tick_stamp(self.tick, self.rate))
 
     def reset(self) -> None:
         """Puts the team back to its initial state, at rest; time goes on."""

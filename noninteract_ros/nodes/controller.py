@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Program `controller`: the central decoupling controller."""
+
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from noninteract_ros.clock import seconds
+from noninteract_ros.control.inputs import SOURCES, Force, Motion, Rate, Target
+from noninteract_ros.control.reference import Reference
+from noninteract_ros.control.team_controller import TeamController
+from noninteract_ros.errors import InputError
+from noninteract_ros.nodes import messages
+from noninteract_ros.nodes.cdr import Floats, JointStateCodec
+from noninteract_ros.nodes.controller_parameters import LiveParameters
+from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder
+from noninteract_ros.nodes.messages import Level, Marker, ParsedReference, SubtaskCodec
+from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker, run_program
+from noninteract_ros.nodes.telemetry import Telemetry
+
+WATCH_PERIOD = 0.1  # [s] how often absent lockstep sources are looked for
+
+
+class Controller(ScenarioNode):
+    """Answers each state of the team with the torques of the law.
+
+    Callbacks only queue what they received; the loop, or in lockstep the callback itself, works
+    it off before the next tick, so that the core is touched by one thread.
+    """
+
+    LIVE = True
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("controller", **kwargs)
+        general = self.scenario.general
+        team = self.scenario.build_team()
+        stack = self.scenario.build_stack(team)
+        self.core: TeamController = self.scenario.build_controller(team, stack)
+        self._joints = JointStateCodec(team.joint_names, required=("position", "velocity"))
+        self._commands = JointStateCodec(team.joint_names)
+        self._queue: deque[Callable[[], None]] = deque()
+        self._state: tuple[int, Floats, Floats] | None = None
+        self._state_at = self._waiting_since = -np.inf
+        self._order = StampOrder()
+        self._answered: tuple[int, bytes] | None = None
+        self._now = 0.0
+        self._cycle_times: deque[float] = deque(maxlen=1000)
+        self._restart = ""
+        self._silent: dict[str, bool] = {}
+        self._command_to = self.create_publisher(JointState, "joint_commands", LOOP_QOS)
+        self._telemetry = Telemetry(self, team, stack)
+        self._live = LiveParameters(self, self.core, self._post)
+        self._watch = SourceWatch(
+            general.lockstep_sources if self.lockstep else (),
+            self.core.inputs,
+            general.lockstep_timeout,
+        )
+        self.subscribe(JointState, "joint_states", self._on_state, raw=True)
+        for subtask in stack.subtasks:
+            codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes)
+            for source in SOURCES:
+                self._listen(codec, source)
+        self.create_service(Trigger, "~/stop", partial(self._on_trigger, self.core.stop, "stopped"))
+        self.create_service(
+            Trigger, "~/resume", partial(self._on_trigger, self.core.resume, "running")
+        )
+        if self.lockstep:
+            self.create_timer(WATCH_PERIOD, self._answer_if_complete, clock=STEADY)
+
+    def _listen(self, codec: SubtaskCodec, source: str) -> None:
+        """Subscribes to everything that one source can send to one subtask."""
+        topic = f"{codec.name}/{source}"
+
+        def take(kind: str, parse: Callable[[Any], Any], message: Any) -> None:
+            parsed = parse(message)
+            self._post(partial(self._receive, f"{topic}/{kind}", codec.name, source, parsed))
+
+        def target(message: PoseStamped) -> tuple[int, Motion]:
+            stamp, position = codec.target(message)
+            return stamp, Target(position, np.zeros_like(position))
+
+        def rate(message: TwistStamped) -> tuple[int, Motion]:
+            stamp, velocity = codec.rate(message)
+            return stamp, Rate(velocity)
+
+        def force(message: WrenchStamped) -> tuple[int, Force]:
+            stamp, wanted = codec.force(message)
+            return stamp, Force(wanted)
+
+        def reference(data: bytes) -> tuple[int, Motion | None]:
+            return _reference(codec.decode(data))
+
+        self.subscribe(
+            MultiDOFJointTrajectory,
+            f"{topic}/reference",
+            partial(take, "reference", reference),
+            raw=True,
+        )
+        self.subscribe(PoseStamped, f"{topic}/target_pose", partial(take, "target_pose", target))
+        self.subscribe(TwistStamped, f"{topic}/target_twist", partial(take, "target_twist", rate))
+        self.subscribe(WrenchStamped, f"{topic}/wrench", partial(take, "wrench", force))
+
+    def _post(self, work: Callable[[], None]) -> None:
+        """Has the thread of the core do something before its next tick."""
+        self._queue.append(work)
+        if self.lockstep:
+            self._work_off()
+            self._answer_if_complete()
+
+    def _work_off(self) -> None:
+        while self._queue:
+            self._queue.popleft()()
+
+    def _receive(
+        self, topic: str, subtask: str, source: str, parsed: tuple[int, Motion | Force | None]
+    ) -> None:
+        """Hands an input to the core, or notes that a source has none."""
+        stamp, item = parsed
+        heard = self.core.inputs[subtask].sources[source]
+        when = seconds(stamp)
+        try:
+            if item is None:
+                heard.silent_until(when)
+                return
+            self._order.check(topic, stamp)
+            # Without a stamp, or by another clock than the team's, an input holds from now on.
+            at_once = stamp == 0 or not self.lockstep
+            heard.receive(self._now if at_once else when, item, self._now)
+        except InputError as error:
+            self.refuse(topic, str(error))
+
+    def _on_state(self, data: bytes) -> None:
+        stamp, q, v, _ = self._joints.decode(data)
+        assert q is not None and v is not None  # The codec requires them.
+        if self._order.check("joint_states", stamp):
+            self._answered = None
+            self._post(self.core.reset)
+        self._state_at = time.monotonic()
+        if self._answered is not None and stamp == self._answered[0]:
+            if self.lockstep:  # The team has not seen the answer.
+                self._command_to.publish(self._answered[1])
+            return
+        if self._state is None or stamp != self._state[0]:
+            self._waiting_since = self._state_at
+        self._state = (stamp, q, v)
+        if self.lockstep:
+            self._answer_if_complete()
+
+    def _answer_if_complete(self) -> None:
+        """Lockstep: answers the state once all that belongs to its tick has come."""
+        if self._state is None or (self._answered and self._answered[0] == self._state[0]):
+            return
+        self._now = seconds(self._state[0])
+        missing = self._watch.missing(self._now, self._waiting_since)
+        if not missing and self._telemetry.complete(self._state[0]):
+            self._answer(*self._state)
+
+    def _answer(self, stamp: int, q: Floats, v: Floats) -> None:
+        began = time.perf_counter()
+        tick = self.core.step(seconds(stamp), q, v)
+        command = self._commands.encode(stamp, effort=tick.torque)
+        self._command_to.publish(command)
+        self._answered = (stamp, command)
+        silent = {name: led.silent for name, led in zip(self.core.inputs, tick.led, strict=True)}
+        self._note(tick.restarted, silent)
+        self._telemetry.publish(stamp, self.core, tick)
+        self._cycle_times.append(time.perf_counter() - began)
+
+    def _note(self, restarted: str, silent: dict[str, bool]) -> None:
+        """Logs what changed: a new start, a source that went silent or came back."""
+        if restarted:
+            self._restart = restarted
+            self.get_logger().info(f"every subtask holds where it is: {restarted}")
+        for name, is_silent in silent.items():
+            if is_silent != self._silent.get(name, is_silent):
+                source = self.core.inputs[name].authority
+                text = "is silent: the subtask holds" if is_silent else "speaks again"
+                self.get_logger().info(f"{name}: {source} {text}")
+        self._silent = silent
+
+    def loop(self) -> None:
+        """Wall time: answers the newest state once per period."""
+        ticker = Ticker(self.scenario.general.rate)
+        while self.context.ok():
+            ticker.wait()
+            state = self._state
+            if state is None or (self._answered and self._answered[0] == state[0]):
+                continue
+            self._now = seconds(state[0])
+            self._work_off()
+            self._answer(*state)
+
+    def _on_trigger(
+        self, action: Callable[[], None], text: str, _: Trigger.Request, response: Trigger.Response
+    ) -> Trigger.Response:
+        self._post(action)
+        self.get_logger().info(text)
+        response.success, response.message = True, text
+        return response
+
+    def status(self) -> tuple[Level, str, dict[str, object]]:
+        """State machine, cycle times, condition of the subtasks, silent sources."""
+        age = time.monotonic() - self._state_at
+        mode = self.core.mode
+        values: dict[str, object] = {
+            "law": mode.law,
+            "time [s]": self._now,
+            "state age [s]": age,
+            "last start": self._restart or "none",
+        }
+        if self._cycle_times:
+            times = 1e6 * np.array(self._cycle_times)
+            values["cycle time, median [us]"] = float(np.median(times))
+            values["cycle time, maximum [us]"] = float(times.max())
+        for name, item in self.core.inputs.items():
+            silent = self._silent.get(name, False)
+            values[f"{name} led by"] = item.authority + (", silent" if silent else "")
+        values |= self._telemetry.condition()
+        if self._state is None:
+            return Level.WARN, "waiting for the first state of the team", values
+        if age > max(1.0, self.scenario.general.state_timeout):
+            return Level.ERROR, "holding: no states of the team", values
+        if mode.stopped:
+            return Level.WARN, "stopped", values
+        if self._watch.absent:
+            return Level.WARN, f"running without {', '.join(sorted(self._watch.absent))}", values
+        silent_ones = [name for name, is_silent in self._silent.items() if is_silent]
+        if silent_ones:
+            return Level.WARN, f"holding {', '.join(silent_ones)}: source silent", values
+        return Level.OK, "running", values
+
+
+def _reference(parsed: ParsedReference | Marker) -> tuple[int, Motion | None]:
+    """What a source asks for: full, shaped where it lacks derivatives, or nothing (a marker)."""
+    if isinstance(parsed, Marker):
+        return parsed.stamp_ns, None
+    if parsed.velocity is not None and parsed.acceleration is not None:
+        motion = Reference(parsed.position, parsed.velocity, parsed.acceleration)
+        return parsed.stamp_ns, motion
+    velocity = np.zeros_like(parsed.position) if parsed.velocity is None else parsed.velocity
+    return parsed.stamp_ns, Target(parsed.position, velocity)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return run_program(Controller, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Law, gains and authority as parameters that may be changed while the controller runs."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.parameter import Parameter
+
+from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
+from noninteract_ros.control.team_controller import TeamController
+from noninteract_ros.errors import ScenarioError
+from noninteract_ros.nodes.node import ScenarioNode
+from noninteract_ros.schema import convert
+
+
+
+class LiveParameters:
+    """Checks a change when it is asked for, and has the loop take it before its next tick.
+
+    Args:
+        node: The controller's node.
+        core: The controller.
+        post: Has the thread of the core run something.
+    """
+
+    def __init__(
+        self, node: ScenarioNode, core: TeamController, post: Callable[[Callable[[], None]], None]
+    ) -> None:
+        self._core, self._post = core, post
+        self._rules = {
+            name: (hint, rule) for name, hint, rule, _ in node.scenario.keys() if rule.live
+        }
+        self._impedances = {
+            name: spec.impedance for name, spec in node.scenario.subtasks.items()
+        }
+        node.add_on_set_parameters_callback(self._on_set)
+
+    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Takes all changes or none; the reason names what is allowed."""
+        impedances = dict(self._impedances)
+        changes: list[Callable[[], None]] = []
+        try:
+            for parameter in parameters:
+                if parameter.name in self._rules:
+                    self._plan(parameter.name, parameter.value, impedances, changes)
+            stack_impedance(self._core.stack.subtasks, list(impedances.values()))
+        except ScenarioError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        for name, settings in impedances.items():
+            if settings != self._impedances[name]:
+                changes.append(partial(self._core.set_impedance, name, settings))
+        self._impedances = impedances
+        for change in changes:
+            self._post(change)
+        return SetParametersResult(successful=True)
+
+    def _plan(
+        self,
+        name: str,
+        value: Any,
+        impedances: dict[str, ImpedanceSettings],
+        changes: list[Callable[[], None]],
+    ) -> None:
+        hint, rule = self._rules[name]
+        checked = convert(name, value, hint, rule)
+        subtask, _, item = name.rpartition(".")
+        if item == "law":
+            changes.append(partial(self._core.set_law, checked))
+        elif item == "authority":
+            changes.append(partial(self._core.set_authority, subtask, checked))
+        else:
+            impedances[subtask] = replace(impedances[subtask], **{item: checked})

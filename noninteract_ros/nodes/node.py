@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What every program shares: the scenario as parameters, diagnostics, refusals, start and end."""
+
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.clock import Clock, ClockType
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
+from rclpy.task import Future
+from rclpy.utilities import remove_ros_args
+
+from noninteract_ros.errors import InputError, ScenarioError
+from noninteract_ros.nodes.messages import Level, to_diagnostics, to_status
+from noninteract_ros.nodes.parameter_files import file_of_key, files_of, rewrite
+from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario_file import nest
+
+NAMESPACE = "team"
+LOOP_QOS = QoSProfile(depth=16)  # reliable; deep enough that a busy reader misses no tick
+DIAGNOSTICS_PERIOD = 0.5
+STEADY = Clock(clock_type=ClockType.STEADY_TIME)
+LOG_PERIOD = 2.0
+EMPTY_TYPES = {
+    tuple[float, ...]: Parameter.Type.DOUBLE_ARRAY,
+    tuple[str, ...]: Parameter.Type.STRING_ARRAY,
+}
+
+
+class ScenarioNode(Node):
+    """A node that is started with a scenario.
+
+    All keys of the scenario become its parameters; they are read-only but for the live ones of a
+    node that sets `LIVE`.
+
+    Args:
+        name: Name of the node.
+        kwargs: Passed on to `rclpy.node.Node`.
+
+    Raises:
+        ScenarioError: The parameters are no valid scenario.
+    """
+
+    LIVE = False
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        kwargs.setdefault("namespace", NAMESPACE)
+        super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        given = {key: item.value for key, item in self.get_parameters_by_prefix("").items()}
+        self.values = nest(given)
+        self.scenario = Scenario.from_dict(self.values)
+        self._declare()
+        self.lockstep = self.scenario.general.lockstep
+        self._refused: Counter[str] = Counter()
+        self._last_refusal = "none"
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.create_timer(DIAGNOSTICS_PERIOD, self.publish_diagnostics, clock=STEADY)
+
+    def _declare(self) -> None:
+        """Declares every key of the scenario: typed, described, read-only unless live here."""
+        for name, hint, rule, value in self.scenario.keys():
+            if self.has_parameter(name):
+                self.undeclare_parameter(name)
+            descriptor = ParameterDescriptor(
+                description=rule.doc,
+                additional_constraints=" | ".join(rule.choices) or rule.numbers_allowed(),
+                read_only=not (rule.live and self.LIVE),
+            )
+            # An empty list has no type of its own: it is declared, but left unset.
+            typed = EMPTY_TYPES.get(hint, value) if value == () else _plain(value)
+            self.declare_parameter(name, typed, descriptor, ignore_override=True)
+
+    def status(self) -> tuple[Level, str, dict[str, object]]:
+        """Level, one line and values for `/diagnostics`."""
+        raise NotImplementedError
+
+    def publish_diagnostics(self) -> None:
+        """Says how the node is."""
+        level, text, values = self.status()
+        if self._refused:
+            values["refused inputs"] = sum(self._refused.values())
+            values["last refusal"] = self._last_refusal
+            values |= {f"refused on {topic}": count for topic, count in self._refused.items()}
+        status = to_status(self.get_fully_qualified_name(), level, text, values)
+        now = self.get_clock().now().nanoseconds
+        self._diagnostics.publish(to_diagnostics(now, [status]))
+
+    def subscribe(
+        self, kind: type, topic: str, take: Callable[[Any], None], *, raw: bool = False
+    ) -> None:
+        """Subscribes; what `take` refuses with an InputError is counted, named and dropped."""
+
+        def checked(message: Any) -> None:
+            try:
+                take(message)
+            except InputError as error:
+                self.refuse(topic, str(error))
+
+        self.create_subscription(kind, topic, checked, LOOP_QOS, raw=raw)
+
+    def refuse(self, topic: str, reason: str) -> None:
+        """Counts and names an input that is refused whole."""
+        self._refused[topic] += 1
+        self._last_refusal = f"{topic}: {reason}"
+        self.get_logger().warning(f"refused {topic}: {reason}", throttle_duration_sec=LOG_PERIOD)
+
+    def loop(self) -> None:
+        """What the main thread does in wall time; in lockstep callbacks do everything."""
+
+    def run(self) -> None:
+        """Runs until the context is shut down."""
+        executor = EventsExecutor(context=self.context)
+        executor.add_node(self)
+        if self.lockstep:
+            spin(executor, self.context)
+            return
+        thread = threading.Thread(target=spin, args=(executor, self.context), daemon=True)
+        thread.start()
+        self.loop()
+
+
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
+
+
+def spin(executor: EventsExecutor, context: rclpy.Context) -> None:
+    """Spins until the context is shut down.
+
+    `EventsExecutor.spin` without a time-out busy-loops in the PyPI wheels; this form does not.
+    """
+    try:
+        while context.ok():
+            executor.spin_until_future_complete(Future(), 3600.0)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+
+
+class Ticker:
+    """Absolute sleeping at a rate; periods that were missed are skipped, not made up for."""
+
+    def __init__(self, rate: float) -> None:
+        self._period = 1.0 / rate
+        self._next = time.monotonic()
+        self.missed = 0
+
+    def wait(self) -> None:
+        """Sleeps until the next period begins."""
+        self._next += self._period
+        now = time.monotonic()
+        if self._next > now:
+            time.sleep(self._next - now)
+        elif now - self._next > self._period:
+            skipped = int((now - self._next) / self._period)
+            self.missed += skipped
+            self._next += skipped * self._period
+
+
+def run_program(make: Callable[[], ScenarioNode], arguments: Sequence[str] | None) -> int:
+    """Main function of a program: exit status 2 and one line where its parameters are wrong."""
+    argv = list(sys.argv if arguments is None else arguments)
+    files = files_of(argv)
+    try:
+        with TemporaryDirectory() as folder:
+            ros_arguments = rewrite(argv, Path(folder))
+            _refuse_plain_arguments(ros_arguments)
+            rclpy.init(args=ros_arguments)
+            node = make()
+    except ScenarioError as error:
+        named = error.file or file_of_key(files, error.key)
+        print(ScenarioError(error.key, error.found, error.allowed, named), file=sys.stderr)
+        rclpy.try_shutdown()
+        return 2
+    sys.setswitchinterval(0.0005)  # The loop must not wait for the executor's thread for long.
+    try:
+        node.run()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
+
+
+def _refuse_plain_arguments(arguments: list[str]) -> None:
+    plain = remove_ros_args(arguments)[1:]
+    if plain:
+        raise ScenarioError("(arguments)", " ".join(plain), "--ros-args ...")

@@ -1,0 +1,194 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Program `robot_team`: a simulated robot team that listens to torques."""
+
+import sys
+import threading
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool, Trigger
+
+from noninteract_ros.clock import tick_stamp
+from noninteract_ros.nodes import messages
+from noninteract_ros.nodes.cdr import JointStateCodec
+from noninteract_ros.nodes.messages import Level
+from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker, run_program
+
+RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is sent again
+
+
+class RobotTeam(ScenarioNode):
+    """Integrates (2) under the torques that answer its states.
+
+    Lockstep: a state is stamped with simulated time, and the team steps when the command with
+    that stamp has come. Wall time: it steps at its rate, holds the last command for
+    `command_timeout` and then brakes.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("robot_team", **kwargs)
+        general = self.scenario.general
+        team = self.scenario.build_team()
+        self._team = team
+        self._simulation = self.scenario.build_simulation(team, self.scenario.build_stack(team))
+        self._states = JointStateCodec(team.joint_names)
+        self._commands = JointStateCodec(team.joint_names, required=("effort",))
+        self._telemetry = max(1, round(general.rate / general.telemetry_rate))
+        self._lock = threading.Lock()
+        self._paused = general.start_paused
+        self._stamp = 0
+        self._sent_at = 0.0
+        self._command: tuple[int, np.ndarray] | None = None
+        self._command_at = -np.inf
+        self._braking = False
+        self._publish_to = self.create_publisher(JointState, "joint_states", LOOP_QOS)
+        self._wrenches = [
+            self.create_publisher(WrenchStamped, f"{name}/external_wrench", LOOP_QOS)
+            for name in team.names
+        ]
+        self._clock_to = (
+            self.create_publisher(Clock, "/clock", LOOP_QOS) if general.publish_clock else None
+        )
+        self.subscribe(JointState, "joint_commands", self._on_command, raw=True)
+        for robot in team.robots:
+            tool = f"{robot.name}/{robot.tool_frame}"
+            self.subscribe(
+                WrenchStamped, f"{robot.name}/push", partial(self._on_push, robot.name, tool)
+            )
+        self.create_service(SetBool, "~/pause", self._on_pause)
+        self.create_service(Trigger, "~/step", self._guarded(self._step_once))
+        self.create_service(Trigger, "~/reset", self._guarded(self._reset))
+        if self.lockstep:
+            self.create_timer(RESEND_PERIOD, self._resend, clock=STEADY)
+
+    def _on_command(self, data: bytes) -> None:
+        stamp, _, _, effort = self._commands.decode(data)
+        assert effort is not None  # The codec requires it.
+        with self._lock:
+            if self.lockstep and stamp != self._stamp:
+                return  # A second answer to a state that was sent twice.
+            self._command, self._command_at = (stamp, effort), time.monotonic()
+            if self.lockstep and not self._paused:
+                self._advance(effort)
+
+    def _on_push(self, robot: str, tool_frame: str, message: WrenchStamped) -> None:
+        _, axes, wrench = messages.push(message, tool_frame)
+        timeout = self.scenario.general.push_timeout
+        with self._lock:
+            self._simulation.push(robot, wrench, axes == "tool", timeout)
+
+    def _advance(self, torque: np.ndarray | None) -> None:
+        """One tick, then the state that follows."""
+        self._simulation.step(torque)
+        self._command = self._command if not self.lockstep else None
+        self._publish()
+
+    def _publish(self) -> None:
+        simulation = self._simulation
+        if self.lockstep:
+            self._stamp = tick_stamp(simulation.tick, simulation.rate)
+        else:
+            self._stamp = self.get_clock().now().nanoseconds
+        self._sent_at = time.monotonic()
+        if self._clock_to is not None:
+            now = messages.to_stamp(tick_stamp(simulation.tick, simulation.rate))
+            self._clock_to.publish(Clock(clock=now))
+        # Wrenches go first: whoever has the state has what acted on it.
+        if simulation.tick % self._telemetry == 0:
+            for publisher, wrench in zip(
+                self._wrenches, simulation.external_wrenches(), strict=True
+            ):
+                publisher.publish(messages.to_wrench_stamped(self._stamp, wrench))
+        self._publish_to.publish(
+            self._states.encode(self._stamp, simulation.q, simulation.v, simulation.torque)
+        )
+
+    def _resend(self) -> None:
+        """Sends an unanswered state again: the first one, or one whose answer was lost."""
+        with self._lock:
+            waiting = time.monotonic() - self._sent_at > RESEND_PERIOD
+            if waiting and not self._paused and self._command is None:
+                self._publish()
+
+    def loop(self) -> None:
+        """Steps at the rate of the scenario in wall time."""
+        ticker = Ticker(self._simulation.rate)
+        timeout = self.scenario.general.command_timeout
+        while self.context.ok():
+            ticker.wait()
+            with self._lock:
+                fresh = time.monotonic() - self._command_at <= timeout
+                self._braking = not fresh
+                if not self._paused:
+                    self._advance(self._command[1] if fresh and self._command else None)
+
+    def _guarded(self, action: Callable[[], tuple[bool, str]]) -> Callable[[Any, Any], Any]:
+        def serve(_: Any, response: Any) -> Any:
+            with self._lock:
+                response.success, response.message = action()
+            return response
+
+        return serve
+
+    def _on_pause(self, request: SetBool.Request, response: SetBool.Response) -> Any:
+        with self._lock:
+            self._paused = request.data
+            if self.lockstep and not self._paused:
+                if self._command is not None:
+                    self._advance(self._command[1])
+                else:
+                    self._publish()
+            response.success = True
+            response.message = "paused" if self._paused else "running"
+        return response
+
+    def _step_once(self) -> tuple[bool, str]:
+        if not self._paused:
+            return False, "pause the team first"
+        if self._command is None and self.lockstep:
+            self._publish()
+            return False, "no command has answered the state yet; it was sent again"
+        self._advance(self._command[1] if self._command else None)
+        return True, f"at {self._simulation.now:.6f} s"
+
+    def _reset(self) -> tuple[bool, str]:
+        self._simulation.reset()
+        # Time goes on, so that no stamp goes back.
+        self._simulation.tick += 1
+        self._command = None
+        self._publish()
+        return True, "at the initial state"
+
+    def status(self) -> tuple[Level, str, dict[str, object]]:
+        """State machine, time and the age of the last command."""
+        age = time.monotonic() - self._command_at
+        values: dict[str, object] = {
+            "time [s]": self._simulation.now,
+            "ticks": self._simulation.tick,
+            "robots": len(self._team.names),
+            "command age [s]": age,
+        }
+        if self._paused:
+            return Level.OK, "paused", values
+        if self._command_at == -np.inf:
+            return Level.WARN, "waiting for the first command", values
+        if self.lockstep and age > 2 * RESEND_PERIOD:
+            return Level.WARN, "waiting for the command that answers the state", values
+        if self._braking:
+            return Level.ERROR, "braking: no fresh command", values
+        return Level.OK, "running", values
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return run_program(RobotTeam, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

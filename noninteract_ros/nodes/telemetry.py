@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the controller tells: subtask states, feedback to devices, energies, conditioning."""
+
+from functools import partial
+
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import MultiDOFJointTrajectory
+
+from noninteract_ros.clock import seconds
+from noninteract_ros.control.team_controller import TeamController, Tick
+from noninteract_ros.nodes.messages import EnergyCodec, SubtaskCodec, external_wrench
+from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.team.team import Team
+
+ENERGY_LABELS = ("time", "storage", "rate", "supplied", "dissipated")
+
+
+class Telemetry:
+    """Publishes feedback at every tick, everything else at the telemetry rate.
+
+    Args:
+        node: The controller's node.
+        team: The robots.
+        stack: Their subtasks.
+    """
+
+    def __init__(self, node: ScenarioNode, team: Team, stack: SubtaskStack) -> None:
+        general = node.scenario.general
+        self._team, self._stack = team, stack
+        self._rate = general.rate
+        self._period = max(1, round(general.rate / general.telemetry_rate))
+        self._lockstep = node.lockstep
+        self._answered = 0
+        self._tick: Tick | None = None
+        self._wrenches = np.zeros((len(team.names), 6))
+        self._wrench_stamps = {name: -1 for name in general.force_sensors}
+        for name in general.force_sensors:
+            take = partial(self._on_wrench, name)
+            node.subscribe(WrenchStamped, f"{name}/external_wrench", take)
+        self._codecs = [SubtaskCodec(task.name, task.elements, task.axes) for task in stack.subtasks]
+        self._energy_codec = EnergyCodec(ENERGY_LABELS)
+        make = node.create_publisher
+        names = stack.names
+        motion = MultiDOFJointTrajectory
+        self._state_to = [make(motion, f"{name}/state", LOOP_QOS) for name in names]
+        self._desired_to = [make(motion, f"{name}/desired", LOOP_QOS) for name in names]
+        self._energy_to = [make(Float64MultiArray, f"{name}/energy", LOOP_QOS) for name in names]
+        # A wrench has one element; a subtask with several edges has no device to be felt with.
+        self._feedback_to = {
+            i: make(WrenchStamped, f"{task.name}/feedback", LOOP_QOS)
+            for i, task in enumerate(stack.subtasks)
+            if len(task.elements) == 1
+        }
+
+    def _on_wrench(self, robot: str, message: WrenchStamped) -> None:
+        stamp, wrench = external_wrench(message)
+        self._wrenches[self._team.index(robot)] = wrench
+        self._wrench_stamps[robot] = stamp
+
+    def complete(self, stamp: int) -> bool:
+        """Whether the wrenches that belong to the tick with this stamp [ns] have come."""
+        tick = round(seconds(stamp) * self._rate)
+        due = tick % self._period == 0
+        return not due or all(heard >= stamp for heard in self._wrench_stamps.values())
+
+    def publish(self, stamp: int, core: TeamController, tick: Tick) -> None:
+        """Tells of a tick, stamped as the state that it answered [ns]."""
+        self._tick = tick
+        slices = self._stack.slices
+        for i, publisher in self._feedback_to.items():
+            feedback = tick.feedback[slices[i]]
+            publisher.publish(self._codecs[i].encode_wrench(stamp, feedback))
+        count = round(seconds(stamp) * self._rate) if self._lockstep else self._answered
+        self._answered += 1
+        if count % self._period:
+            return
+        energy = core.energy(tick, self._team.external_torque(tick.state, self._wrenches))
+        accounts = np.array([energy.storage, energy.rate, energy.supplied, energy.dissipated]).T
+        for i, (codec, part) in enumerate(zip(self._codecs, slices, strict=True)):
+            wanted = tick.led[i].reference
+            actual = codec.encode(stamp, tick.task.x[part], tick.x_rate[part])
+            self._state_to[i].publish(actual)
+            self._desired_to[i].publish(
+                codec.encode(stamp, wanted.position, wanted.velocity, wanted.acceleration)
+            )
+            account = np.concatenate(([seconds(stamp)], accounts[i]))
+            self._energy_to[i].publish(self._energy_codec.encode(account))
+
+    def condition(self) -> dict[str, object]:
+        """Smallest singular value of the stacked Jacobian and largest tracking error."""
+        if self._tick is None:
+            return {}
+        values: dict[str, object] = {
+            "smallest singular value": float(np.linalg.svd(self._tick.task.J, compute_uv=False)[-1])
+        }
+        for name, part in zip(self._stack.names, self._stack.slices, strict=True):
+            values[f"{name} error"] = float(np.abs(self._tick.error.e[part]).max())
+        return values
