@@ -13,7 +13,7 @@ from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_of
 from noninteract_ros.operator.haptic import HapticDevice, HapticSettings
 from noninteract_ros.operator.planner import Formation, FormationPlanner, PlannerSettings
-from noninteract_ros.schema import Key, describe, join, key, load
+from noninteract_ros.schema import Key, describe, join, key, keys_of, load
 from noninteract_ros.simulation.push import ScheduledPush
 from noninteract_ros.simulation.subtask_object import ObjectSettings, SubtaskObject
 from noninteract_ros.simulation.team_simulation import TeamSimulation
@@ -121,18 +121,15 @@ class Scenario:
         scenario.check()
         return scenario
 
-    def keys(self) -> Iterator[tuple[str, Any, Key, Any]]:
+    def parameters(self) -> Iterator[tuple[str, Any, Key, Any]]:
         """Dotted key, type, rule and value of every key of every block."""
-        yield from describe(self.general)
-        for blocks in (self.robots, self.pushes):
-            for name, block in blocks.items():  # type: ignore[attr-defined]
-                yield from describe(block, name)
+        blocks: list[tuple[str, object | None]] = [("", self.general)]
+        blocks += [*self.robots.items(), *self.pushes.items()]
+        blocks += [("object", self.held), ("haptic", self.haptic), ("planner", self.planner)]
+        blocks += [(f"planner.{name}", block) for name, block in self.formations.items()]
         for name, spec in self.subtasks.items():
-            for part in (spec.kind, spec.impedance, spec.input):
-                yield from describe(part, name)
-        optional = {"object": self.held, "haptic": self.haptic, "planner": self.planner}
-        formations = {f"planner.{name}": block for name, block in self.formations.items()}
-        for name, block in (optional | formations).items():
+            blocks += [(name, part) for part in (spec.kind, spec.impedance, spec.input)]
+        for name, block in blocks:
             if block is not None:
                 yield from describe(block, name)
 
@@ -264,13 +261,15 @@ def _load_subtask(name: str, values: Mapping[str, Any]) -> SubtaskSpec:
         found = "nothing" if kind is None else repr(kind)
         raise ScenarioError(f"{name}.kind", found, one_of(SUBTASK_KINDS, str(kind)))
     blocks = (SUBTASK_KINDS[kind], ImpedanceSettings, InputSettings)
-    keys = [[item.name for item in fields(block)] for block in blocks]  # type: ignore[arg-type]
-    known = [item for group in keys for item in group]
+    known = tuple(item.name for block in blocks for item in keys_of(block))
     for item in values:
         if item not in known:
             raise ScenarioError(join(name, item), "an unknown key", one_of(known, item))
-    parts = [load(block, values, name, ignore=tuple(known)) for block in blocks]
-    return SubtaskSpec(*parts)
+    return SubtaskSpec(
+        load(SUBTASK_KINDS[kind], values, name, ignore=known),
+        load(ImpedanceSettings, values, name, ignore=known),
+        load(InputSettings, values, name, ignore=known),
+    )
 
 
 def _load_planner(

@@ -88,7 +88,9 @@ def _merge(old: dict[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
 def config_folders() -> list[Path]:
     """Folders that hold the package's scenarios: a source tree, an installation, a ROS prefix."""
     prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(":")), sys.prefix]
-    shares = [Path(prefix, "share") for prefix in prefixes] + [Path(sysconfig.get_path("data"), "share")]
+    shares = [Path(prefix, "share") for prefix in prefixes] + [
+        Path(sysconfig.get_path("data"), "share")
+    ]
     source = Path(__file__).parents[1] / "config"
     return [source, *(share / PACKAGE / "config" for share in shares)]
 

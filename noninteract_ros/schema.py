@@ -37,7 +37,9 @@ class Key:
 
     def numbers_allowed(self) -> str:
         """The allowed range in words."""
-        low = f"{'>' if self.strict else '>='} {self.minimum:g}" if self.minimum > -math.inf else ""
+        low = (
+            f"{'>' if self.strict else '>='} {self.minimum:g}" if self.minimum > -math.inf else ""
+        )
         high = f"<= {self.maximum:g}" if self.maximum < math.inf else ""
         return " and ".join(part for part in (low, high) if part) or "finite"
 
@@ -58,7 +60,9 @@ def key(
     return field(default=default, metadata=metadata)
 
 
-def load(block: type[Block], values: Mapping[str, Any], path: str = "", ignore: tuple[str, ...] = ()) -> Block:
+def load(
+    block: type[Block], values: Mapping[str, Any], path: str = "", ignore: tuple[str, ...] = ()
+) -> Block:
     """Builds a block from a mapping and checks every key.
 
     Args:
@@ -78,9 +82,13 @@ def load(block: type[Block], values: Mapping[str, Any], path: str = "", ignore: 
     arguments = {}
     for name, item in known.items():
         if name in values:
-            arguments[name] = convert(join(path, name), values[name], hints[name], item.metadata["key"])
+            arguments[name] = convert(
+                join(path, name), values[name], hints[name], item.metadata["key"]
+            )
         elif item.default is MISSING:
-            raise ScenarioError(join(path, name), "nothing", f"{type_name(hints[name])} (required)")
+            raise ScenarioError(
+                join(path, name), "nothing", f"{type_name(hints[name])} (required)"
+            )
     return block(**arguments)
 
 

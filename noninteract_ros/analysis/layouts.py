@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
 
 _ORIGIN = 4  # bytes of encapsulation header; alignment counts from behind it
@@ -175,12 +176,12 @@ class Group(NamedTuple):
     rows: NDArray[np.intp]
     data: NDArray[np.uint8]
 
-    def doubles(self, block: Block) -> NDArray[np.float64]:
+    def doubles(self, block: Block) -> Array:
         """The numbers of a block, shape (m, count)."""
         part = self.data[:, block.offset : block.offset + 8 * block.length]
         return np.ascontiguousarray(part).view("<f8")
 
-    def stamps(self) -> NDArray[np.float64]:
+    def stamps(self) -> Array:
         """`header.stamp` of each message [s], shape (m,)."""
         assert self.layout.stamp is not None
         part = self.data[:, self.layout.stamp : self.layout.stamp + 8]

@@ -23,7 +23,14 @@ from noninteract_ros.errors import RecordingError
 MAGIC = bytes([0x89]) + b"MCAP0\r\n"
 _FRAME = struct.Struct("<BQ")
 _MESSAGE = struct.Struct("<HIQQ")
-DAMAGE = (ValueError, MemoryError, struct.error, zstandard.ZstdError, McapError)
+DAMAGE = (
+    ValueError,
+    OverflowError,
+    MemoryError,
+    struct.error,
+    zstandard.ZstdError,
+    McapError,
+)
 """What the `mcap` package raises on a record that holds something else than it should."""
 
 

@@ -13,9 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noninteract_ros.analysis import layouts
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import one_of
-
-Array = NDArray[np.float64]
 
 TIME = "time"
 

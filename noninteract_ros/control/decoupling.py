@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.impedance import Impedance
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import TeamState
 
-Array = NDArray[np.float64]
 LAWS = ("noninteracting", "natural", "paper")
 
 

@@ -6,13 +6,11 @@ acceleration and jerk. A full reference passes unchanged once it has been taken 
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from ruckig import ControlInterface, InputParameter, OutputParameter, Result, Ruckig
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.inputs import Motion, Rate, Target
 from noninteract_ros.control.reference import Reference
-
-Array = NDArray[np.float64]
 
 
 class Shaper:

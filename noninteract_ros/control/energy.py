@@ -4,8 +4,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.decoupling import (
     TaskDynamics,
     TaskError,
@@ -14,8 +14,6 @@ from noninteract_ros.control.decoupling import (
     multiply_by_inertias,
 )
 from noninteract_ros.control.impedance import Impedance
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,19 +5,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import key
 from noninteract_ros.subtasks.subtask import Subtask
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class ImpedanceSettings:
-    """Configuration of one subtask's impedance: one number for all coordinates, one per axis, or
-    one per coordinate."""
+    """Configuration of one subtask's impedance.
+
+    Each list has one number for all coordinates, one per axis, or one per coordinate.
+    """
 
     stiffness: tuple[float, ...] = key("Stiffness [N/m]", minimum=0.0, live=True)
     damping: tuple[float, ...] = key("Damping [N s/m]", positive=True, live=True)

@@ -5,12 +5,11 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.errors import InputError
 
-Array = NDArray[np.float64]
 SOURCES = ("human", "autonomy")
 HORIZON = 1.0  # [s] how far ahead of the team's time an input may be stamped
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The law as the paper writes it, tau_c = alpha + Gamma tau~_c: the reference for the fast form."""
+"""The law as the paper writes it, alpha + Gamma tau~_c: the reference for the fast form."""
 
 import numpy as np
 
-from noninteract_ros.control.decoupling import Array, TaskDynamics, TaskError
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.decoupling import TaskDynamics, TaskError
 from noninteract_ros.control.impedance import Impedance
 
 
@@ -35,9 +36,7 @@ def task_coriolis(dynamics: TaskDynamics) -> Array:
     """C_s = M_s (J M^-1 C - J_rate) S, shape (n, n)."""
     M_s = block_diagonal(dynamics, dynamics.inertias)
     return (
-        M_s
-        @ (dynamics.J @ np.linalg.solve(dynamics.M, dynamics.C) - dynamics.J_rate)
-        @ dynamics.S
+        M_s @ (dynamics.J @ np.linalg.solve(dynamics.M, dynamics.C) - dynamics.J_rate) @ dynamics.S
     )  # Eq. (25).
 
 
@@ -100,9 +99,7 @@ def plain_torque(
     )  # Eq. (7).
 
 
-def natural_torque(
-    dynamics: TaskDynamics, error: TaskError, impedance: Impedance
-) -> Array:
+def natural_torque(dynamics: TaskDynamics, error: TaskError, impedance: Impedance) -> Array:
     """J' (Lambda a_d + mu v_d - D e_rate - h(e) + f) + g, shape (n,) [N or N m]."""
     S_rate = -dynamics.S @ dynamics.J_rate @ dynamics.S
     mu = dynamics.S.T @ (dynamics.C @ dynamics.S + dynamics.M @ S_rate)

@@ -4,7 +4,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from noninteract_ros.arrays import Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,9 +19,9 @@ class Reference:
         acceleration: Desired acceleration ẍᵈ, shape (dim,).
     """
 
-    position: NDArray[np.float64]
-    velocity: NDArray[np.float64]
-    acceleration: NDArray[np.float64]
+    position: Array
+    velocity: Array
+    acceleration: Array
 
     @classmethod
     def still(cls, position: ArrayLike) -> "Reference":

@@ -5,8 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.desired import DesiredMotion
-from noninteract_ros.control.impedance import Array, spread
+from noninteract_ros.control.impedance import spread
 from noninteract_ros.control.inputs import SOURCES, Motion, Source
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.schema import key
@@ -76,7 +77,7 @@ class SubtaskInput:
         self._desired = DesiredMotion(limits, settings.takeover == "direct")
         self._max_force = spread(subtask, "max_wrench", settings.max_wrench)
         self._max_force_rate = spread(subtask, "max_wrench_rate", settings.max_wrench_rate)
-        self._force = np.zeros(subtask.dim)
+        self._force: Array = np.zeros(subtask.dim)
 
     def rest_at(self, x: Array) -> None:
         """Holds at x, shape (p,), until the source in force speaks again."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.decoupling import (
     TaskDynamics,
     TaskError,
@@ -14,7 +15,7 @@ from noninteract_ros.control.decoupling import (
     task_dynamics,
 )
 from noninteract_ros.control.energy import Energy, energy
-from noninteract_ros.control.impedance import Array, Impedance, ImpedanceSettings, stack_impedance
+from noninteract_ros.control.impedance import Impedance, ImpedanceSettings, stack_impedance
 from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import SubtaskState
@@ -176,7 +177,9 @@ class TeamController:
         torque = self.team.inverse_dynamics(q, v, wanted)
         self._last = (now, q)
         x_rate = error.e_rate + error.reference_velocity
-        feedback = self._mode.impedance.damping * error.e_rate + self._mode.impedance.force(error.e)
+        feedback = self._mode.impedance.damping * error.e_rate + self._mode.impedance.force(
+            error.e
+        )
         return Tick(
             torque, state, task, x_rate, error, led, dynamics, acceleration, feedback, restarted
         )

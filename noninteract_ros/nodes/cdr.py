@@ -11,14 +11,13 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError, one_of
 
 Message = TypeVar("Message")
-Floats = NDArray[np.float64]
 SECOND = 10**9
 QUANTITIES = ("position", "velocity", "effort")
 ENCAPSULATION = b"\x00\x01\x00\x00"  # plain CDR, little-endian, no options
@@ -50,7 +49,7 @@ def deserialize(data: bytes, message_type: type[Message]) -> Message:
     return message
 
 
-def check_finite(values: Floats, label: Callable[[int], str]) -> None:
+def check_finite(values: Array, label: Callable[[int], str]) -> None:
     """Refuses NaN and infinity.
 
     Args:
@@ -119,7 +118,7 @@ class CdrTemplate:
         self._places = np.array(layout.floats, dtype=np.intp)
         self._written = self._places if written is None else self._places[list(written)]
 
-    def encode(self, values: Floats, stamp_ns: int | None = None) -> bytes:
+    def encode(self, values: Array, stamp_ns: int | None = None) -> bytes:
         """The bytes of the message with these numbers.
 
         Args:
@@ -136,7 +135,7 @@ class CdrTemplate:
         self._floats[self._written] = values
         return bytes(self._payload)
 
-    def decode(self, data: bytes) -> tuple[int, Floats] | None:
+    def decode(self, data: bytes) -> tuple[int, Array] | None:
         """Stamp [ns] (0 without a header) and all numbers of a message of this very shape.
 
         None where any other byte differs: that message has to be deserialized.
@@ -208,9 +207,9 @@ class JointArrays(NamedTuple):
     """
 
     stamp_ns: int
-    position: Floats | None
-    velocity: Floats | None
-    effort: Floats | None
+    position: Array | None
+    velocity: Array | None
+    effort: Array | None
 
 
 class JointStateCodec:
@@ -234,9 +233,9 @@ class JointStateCodec:
     def encode(
         self,
         stamp_ns: int,
-        position: Floats | None = None,
-        velocity: Floats | None = None,
-        effort: Floats | None = None,
+        position: Array | None = None,
+        velocity: Array | None = None,
+        effort: Array | None = None,
     ) -> bytes:
         """Serialized message with those arrays (n,) that are given."""
         arrays = dict(zip(QUANTITIES, (position, velocity, effort), strict=True))
@@ -274,7 +273,7 @@ class JointStateCodec:
                 raise InputError(f"{name} has {array.size} numbers for {len(self.names)} joints")
         return self._checked(stamp, tuple(given), np.concatenate(arrays))
 
-    def _checked(self, stamp: int, given: tuple[str, ...], values: Floats) -> JointArrays:
+    def _checked(self, stamp: int, given: tuple[str, ...], values: Array) -> JointArrays:
         count = len(self.names)
         for name in self._required:
             if name not in given and count:

@@ -14,13 +14,13 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds
 from noninteract_ros.control.inputs import SOURCES, Force, Motion, Rate, Target
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes import messages
-from noninteract_ros.nodes.cdr import Floats, JointStateCodec
+from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.controller_parameters import LiveParameters
 from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder
 from noninteract_ros.nodes.messages import Level, Marker, ParsedReference, SubtaskCodec
@@ -48,7 +48,7 @@ class Controller(ScenarioNode):
         self._joints = JointStateCodec(team.joint_names, required=("position", "velocity"))
         self._commands = JointStateCodec(team.joint_names)
         self._queue: deque[Callable[[], None]] = deque()
-        self._state: tuple[int, Floats, Floats] | None = None
+        self._state: tuple[int, Array, Array] | None = None
         self._state_at = self._waiting_since = -np.inf
         self._order = StampOrder()
         self._answered: tuple[int, bytes] | None = None
@@ -69,7 +69,9 @@ class Controller(ScenarioNode):
             codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes)
             for source in SOURCES:
                 self._listen(codec, source)
-        self.create_service(Trigger, "~/stop", partial(self._on_trigger, self.core.stop, "stopped"))
+        self.create_service(
+            Trigger, "~/stop", partial(self._on_trigger, self.core.stop, "stopped")
+        )
         self.create_service(
             Trigger, "~/resume", partial(self._on_trigger, self.core.resume, "running")
         )
@@ -140,7 +142,8 @@ class Controller(ScenarioNode):
 
     def _on_state(self, data: bytes) -> None:
         stamp, q, v, _ = self._joints.decode(data)
-        assert q is not None and v is not None  # The codec requires them.
+        assert q is not None  # The codec requires both.
+        assert v is not None
         if self._order.check("joint_states", stamp):
             self._answered = None
             self._post(self.core.reset)
@@ -164,7 +167,7 @@ class Controller(ScenarioNode):
         if not missing and self._telemetry.complete(self._state[0]):
             self._answer(*self._state)
 
-    def _answer(self, stamp: int, q: Floats, v: Floats) -> None:
+    def _answer(self, stamp: int, q: Array, v: Array) -> None:
         began = time.perf_counter()
         tick = self.core.step(seconds(stamp), q, v)
         command = self._commands.encode(stamp, effort=tick.torque)

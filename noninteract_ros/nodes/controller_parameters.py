@@ -16,7 +16,6 @@ from noninteract_ros.nodes.node import ScenarioNode
 from noninteract_ros.schema import convert
 
 
-
 class LiveParameters:
     """Checks a change when it is asked for, and has the loop take it before its next tick.
 
@@ -31,11 +30,9 @@ class LiveParameters:
     ) -> None:
         self._core, self._post = core, post
         self._rules = {
-            name: (hint, rule) for name, hint, rule, _ in node.scenario.keys() if rule.live
+            name: (hint, rule) for name, hint, rule, _ in node.scenario.parameters() if rule.live
         }
-        self._impedances = {
-            name: spec.impedance for name, spec in node.scenario.subtasks.items()
-        }
+        self._impedances = {name: spec.impedance for name, spec in node.scenario.subtasks.items()}
         node.add_on_set_parameters_callback(self._on_set)
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:

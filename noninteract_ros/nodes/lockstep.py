@@ -72,6 +72,8 @@ class StampOrder:
         now = time.monotonic()
         last, at = self._last.get(topic, (stamp, now))
         if stamp < last and now - at < RESTART_SILENCE:
-            raise InputError(f"stamp goes back: {seconds(stamp):.6f} s after {seconds(last):.6f} s")
+            raise InputError(
+                f"stamp goes back: {seconds(stamp):.6f} s after {seconds(last):.6f} s"
+            )
         self._last[topic] = (stamp, now)
         return stamp < last

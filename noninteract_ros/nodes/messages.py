@@ -18,9 +18,10 @@ from geometry_msgs import msg as geometry
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes import cdr
-from noninteract_ros.nodes.cdr import CdrTemplate, Floats, check_finite
+from noninteract_ros.nodes.cdr import CdrTemplate, check_finite
 
 WORLD = "world"
 AXES = ("x", "y", "z")
@@ -39,9 +40,9 @@ class ParsedReference:
     """
 
     stamp_ns: int
-    position: Floats
-    velocity: Floats | None
-    acceleration: Floats | None
+    position: Array
+    velocity: Array | None
+    acceleration: Array | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ def check_frame(frame_id: str, *allowed: str) -> None:
         raise InputError(f"frame {frame_id[:80]!r} is unknown, allowed: {' | '.join(allowed)}")
 
 
-def check_rotations(rotations: Floats, names: Sequence[str]) -> None:
+def check_rotations(rotations: Array, names: Sequence[str]) -> None:
     """Raises InputError, with its name, where one of the quaternions (n, 4) is not a unit one."""
     with np.errstate(over="ignore"):
         lengths = np.sqrt(np.einsum("ij,ij->i", rotations, rotations))
@@ -79,12 +80,12 @@ def check_rotations(rotations: Floats, names: Sequence[str]) -> None:
         raise InputError(f"rotation of {names[first]} is no unit quaternion (length {length:.3g})")
 
 
-def flat(*parts: Any) -> Floats:
+def flat(*parts: Any) -> Array:
     """The numbers of vectors (x, y, z) and quaternions (x, y, z, w), one after the other."""
     return np.array([getattr(part, axis) for part in parts for axis in FIELDS[type(part)]])
 
 
-def push(message: geometry.WrenchStamped, tool_frame: str) -> tuple[int, str, Floats]:
+def push(message: geometry.WrenchStamped, tool_frame: str) -> tuple[int, str, Array]:
     """Stamp [ns], axes ("world" or "tool") and wrench [N, N m] (6,) on a robot at its tool point.
 
     Raises:
@@ -97,14 +98,14 @@ def push(message: geometry.WrenchStamped, tool_frame: str) -> tuple[int, str, Fl
     return stamp_ns(message.header.stamp), axes, values
 
 
-def external_wrench(message: geometry.WrenchStamped) -> tuple[int, Floats]:
+def external_wrench(message: geometry.WrenchStamped) -> tuple[int, Array]:
     """Stamp [ns] and wrench [N, N m] (6,) in world axes; raises InputError as `push`."""
     check_frame(message.header.frame_id, WORLD)
     stamp, _, values = push(message, WORLD)
     return stamp, values
 
 
-def to_wrench_stamped(time_ns: int, values: Floats, frame: str = WORLD) -> geometry.WrenchStamped:
+def to_wrench_stamped(time_ns: int, values: Array, frame: str = WORLD) -> geometry.WrenchStamped:
     """Message with a wrench [N, N m] (6,) in the axes of a frame."""
     message = geometry.WrenchStamped()
     message.header.stamp, message.header.frame_id = to_stamp(time_ns), frame
@@ -145,7 +146,7 @@ class SubtaskCodec:
         ]
         self._wrench = CdrTemplate(to_wrench_stamped(0, np.zeros(6)), self._axes)
 
-    def encode(self, time_ns: int, *motion: Floats) -> bytes:
+    def encode(self, time_ns: int, *motion: Array) -> bytes:
         """Serialized MultiDOFJointTrajectory: a reference, the state or the desired motion.
 
         Args:
@@ -158,7 +159,7 @@ class SubtaskCodec:
         """Serialized MultiDOFJointTrajectory without points: nothing new up to this stamp [ns]."""
         return self._marker.encode(np.zeros(0), time_ns)
 
-    def encode_wrench(self, time_ns: int, force: Floats) -> bytes:
+    def encode_wrench(self, time_ns: int, force: Array) -> bytes:
         """Serialized WrenchStamped with a force (dim,) [N]; for a subtask with one element."""
         return self._wrench.encode(force, time_ns)
 
@@ -195,26 +196,26 @@ class SubtaskCodec:
             parts += [part for item in items for part in (item.linear, item.angular)]
         return self._parsed(stamp, flat(*parts))
 
-    def target(self, message: geometry.PoseStamped) -> tuple[int, Floats]:
+    def target(self, message: geometry.PoseStamped) -> tuple[int, Array]:
         """Stamp [ns] and position (dim,) [m] of a set-point; raises InputError as `reference`."""
         values = flat(message.pose.position, message.pose.orientation)
         self._check_single(message, values, POSE)
         check_rotations(values[None, 3:], self.elements)
         return stamp_ns(message.header.stamp), values[self._axes]
 
-    def rate(self, message: geometry.TwistStamped) -> tuple[int, Floats]:
+    def rate(self, message: geometry.TwistStamped) -> tuple[int, Array]:
         """Stamp [ns] and velocity (dim,) [m/s] of a rate; raises InputError as `reference`."""
         values = flat(message.twist.linear, message.twist.angular)
         self._check_single(message, values, TWIST)
         return stamp_ns(message.header.stamp), values[self._axes]
 
-    def force(self, message: geometry.WrenchStamped) -> tuple[int, Floats]:
+    def force(self, message: geometry.WrenchStamped) -> tuple[int, Array]:
         """Stamp [ns] and force (dim,) [N] of a source; raises InputError as `reference`."""
         values = flat(message.wrench.force, message.wrench.torque)
         self._check_single(message, values, WRENCH)
         return stamp_ns(message.header.stamp), values[self._axes]
 
-    def _check_single(self, message: Any, values: Floats, labels: Sequence[str]) -> None:
+    def _check_single(self, message: Any, values: Array, labels: Sequence[str]) -> None:
         if len(self.elements) > 1:
             kind, count = type(message).__name__, len(self.elements)
             raise InputError(f"{kind} has one element, {self.name} has {count}: use `reference`")
@@ -232,7 +233,7 @@ class SubtaskCodec:
         if point.time_from_start.sec or point.time_from_start.nanosec:
             raise InputError("time_from_start is not zero: the time is header.stamp")
 
-    def _parsed(self, stamp: int, values: Floats) -> ParsedReference:
+    def _parsed(self, stamp: int, values: Array) -> ParsedReference:
         count = len(self.elements)
         check_finite(values, self._label)
         check_rotations(values[: 7 * count].reshape(count, 7)[:, 3:], self.elements)
@@ -269,7 +270,7 @@ class EnergyCodec:
         message.layout.dim = [MultiArrayDimension(label=name, size=1, stride=1) for name in labels]
         self._template = CdrTemplate(message)
 
-    def encode(self, values: Floats) -> bytes:
+    def encode(self, values: Array) -> bytes:
         """Serialized message with one value per label."""
         return self._template.encode(values)
 

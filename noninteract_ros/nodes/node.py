@@ -70,7 +70,7 @@ class ScenarioNode(Node):
 
     def _declare(self) -> None:
         """Declares every key of the scenario: typed, described, read-only unless live here."""
-        for name, hint, rule, value in self.scenario.keys():
+        for name, hint, rule, value in self.scenario.parameters():
             if self.has_parameter(name):
                 self.undeclare_parameter(name)
             descriptor = ParameterDescriptor(

@@ -6,6 +6,7 @@ What is wrong is said in one clear line, and two traps of ROS's own reader are t
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,7 @@ _Quoted.add_representer(
 
 def files_of(arguments: Sequence[str]) -> list[str]:
     """Files that a ROS command line names after `--params-file`."""
-    pairs = zip(arguments, arguments[1:], strict=False)
-    return [value for option, value in pairs if option == OPTION]
+    return [value for option, value in pairwise(arguments) if option == OPTION]
 
 
 def rewrite(arguments: Sequence[str], folder: Path) -> list[str]:

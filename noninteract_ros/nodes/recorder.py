@@ -16,6 +16,7 @@ from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.exceptions import InvalidParameterTypeException, InvalidTopicNameException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
+from rclpy.validate_topic_name import validate_topic_name
 
 from noninteract_ros.analysis.definitions import definition
 from noninteract_ros.analysis.recording import RunWriter
@@ -169,9 +170,11 @@ class RecorderNode(Node):
 
     def _subscribe_known(self, name: str, type_name: str) -> None:
         try:
+            validate_topic_name(name)
             self._subscribe(self.resolve_topic_name(name), type_name)
-        except (ValueError, InvalidTopicNameException) as error:
-            raise RecordingError(f"parameter topics: {name!r}: {error}") from error
+        except InvalidTopicNameException as error:
+            reason = " ".join(str(error).split())  # It draws a pointer on lines of its own.
+            raise RecordingError(f"parameter topics: {reason}") from error
 
     def _subscribe(self, topic: str, type_name: str) -> None:
         try:

@@ -8,8 +8,9 @@ from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
-from noninteract_ros.nodes.cdr import Floats, JointStateCodec
+from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.lockstep import StampOrder
 from noninteract_ros.nodes.messages import Level, SubtaskCodec
 from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
@@ -85,9 +86,11 @@ class SourceNode(ScenarioNode):
             if reference is None:
                 self._publish_to.publish(self._codec.encode_marker(stamp))
             else:
-                self._publish(stamp, reference.position, reference.velocity, reference.acceleration)
+                self._publish(
+                    stamp, reference.position, reference.velocity, reference.acceleration
+                )
 
-    def _publish(self, stamp: int, *motion: Floats) -> None:
+    def _publish(self, stamp: int, *motion: Array) -> None:
         self._publish_to.publish(self._codec.encode(stamp, *motion))
         self._sent += 1
 

@@ -36,11 +36,13 @@ class Telemetry:
         self._answered = 0
         self._tick: Tick | None = None
         self._wrenches = np.zeros((len(team.names), 6))
-        self._wrench_stamps = {name: -1 for name in general.force_sensors}
+        self._wrench_stamps = dict.fromkeys(general.force_sensors, -1)
         for name in general.force_sensors:
             take = partial(self._on_wrench, name)
             node.subscribe(WrenchStamped, f"{name}/external_wrench", take)
-        self._codecs = [SubtaskCodec(task.name, task.elements, task.axes) for task in stack.subtasks]
+        self._codecs = [
+            SubtaskCodec(task.name, task.elements, task.axes) for task in stack.subtasks
+        ]
         self._energy_codec = EnergyCodec(ENERGY_LABELS)
         make = node.create_publisher
         names = stack.names
@@ -94,7 +96,9 @@ class Telemetry:
         if self._tick is None:
             return {}
         values: dict[str, object] = {
-            "smallest singular value": float(np.linalg.svd(self._tick.task.J, compute_uv=False)[-1])
+            "smallest singular value": float(
+                np.linalg.svd(self._tick.task.J, compute_uv=False)[-1]
+            )
         }
         for name, part in zip(self._stack.names, self._stack.slices, strict=True):
             values[f"{name} error"] = float(np.abs(self._tick.error.e[part]).max())

@@ -2,9 +2,9 @@
 """The hand that holds the haptic device: a mass-damper-spring that feels the feedback force."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 
 
@@ -31,21 +31,21 @@ class Hand:
         generator = np.zeros((3, 3))  # of (e, ė, f) with f held
         generator[0, 1] = 1.0
         generator[1] = -stiffness / mass, -damping / mass, 1.0 / mass
-        self._transition: NDArray[np.float64] = expm(generator * period)
+        self._transition: Array = expm(generator * period)
         self._state = np.zeros((2, dim))
 
     def reset(self) -> None:
         """Puts the device back on the intended motion."""
         self._state = np.zeros_like(self._state)
 
-    def advance(self, force: NDArray[np.float64], periods: int) -> None:
+    def advance(self, force: Array, periods: int) -> None:
         """Lets a constant force [N], shape (dim,), act for a number of update periods."""
         transition = self._transition
         if periods != 1:
             transition = np.linalg.matrix_power(transition, periods)
         self._state = transition[:2, :2] @ self._state + np.outer(transition[:2, 2], force)
 
-    def deflect(self, intended: Reference, force: NDArray[np.float64]) -> Reference:
+    def deflect(self, intended: Reference, force: Array) -> Reference:
         """The device's motion under a force [N], shape (dim,), about the intended one."""
         error, error_rate = self._state
         pull = force - self._damping * error_rate - self._stiffness * error

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.errors import InputError, ScenarioError
 from noninteract_ros.operator import motion as motions
@@ -87,7 +87,7 @@ class HapticDevice:
             )
         self._sampled: int | None = None
 
-    def sample(self, t: float, feedback: NDArray[np.float64] | None = None) -> Reference | None:
+    def sample(self, t: float, feedback: Array | None = None) -> Reference | None:
         """The device's motion at an update instant.
 
         The feedback acts over the time since the last sample. A hand whose connection dropped out
@@ -122,7 +122,7 @@ class HapticDevice:
         """The first instant later than `t` [s] for which there is a sample; infinity if none."""
         return self._schedule.silent_until(t)
 
-    def _move(self, hand: Hand, index: int, force: NDArray[np.float64]) -> None:
+    def _move(self, hand: Hand, index: int, force: Array) -> None:
         if self._sampled is None or index < self._sampled:
             hand.reset()
         elif index > self._sampled:
@@ -131,7 +131,7 @@ class HapticDevice:
             hand.advance(felt, index - self._sampled)
         self._sampled = index
 
-    def _checked(self, feedback: NDArray[np.float64] | None) -> NDArray[np.float64]:
+    def _checked(self, feedback: Array | None) -> Array:
         if feedback is None:
             return np.zeros(self._dim)
         if feedback.shape != (self._dim,):

@@ -2,8 +2,9 @@
 """Minimum-jerk moves from rest to rest."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 
 
@@ -39,9 +40,9 @@ class RestToRest:
             durations: Their durations [s], shape (n,), positive.
             values: Resting values, shape (n + 1, dim).
         """
-        self._starts: NDArray[np.float64] = np.array(starts, dtype=np.float64)
-        self._durations: NDArray[np.float64] = np.array(durations, dtype=np.float64)
-        self._values: NDArray[np.float64] = np.array(values, dtype=np.float64)
+        self._starts: Array = np.array(starts, dtype=np.float64)
+        self._durations: Array = np.array(durations, dtype=np.float64)
+        self._values: Array = np.array(values, dtype=np.float64)
 
     def __call__(self, t: float) -> Reference:
         """The motion at time `t` [s]."""

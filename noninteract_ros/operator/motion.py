@@ -4,8 +4,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.operator.minimum_jerk import RestToRest, blend
 
@@ -104,7 +105,7 @@ def with_tremor(motion: Motion, amplitude: float, seed: int, dim: int) -> Motion
         dim: Number of coordinates.
     """
     phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, (dim, TREMOR_FREQUENCIES.size))
-    rates: NDArray[np.float64] = 2.0 * np.pi * TREMOR_FREQUENCIES
+    rates: Array = 2.0 * np.pi * TREMOR_FREQUENCIES
     share = amplitude / rates.size
 
     def trembling(t: float) -> Reference:

@@ -5,9 +5,7 @@ import math
 from collections.abc import Iterator
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, stamp, tick_stamp
 from noninteract_ros.control.reference import Reference
 
@@ -17,7 +15,7 @@ FAR = 3600.0  # [s] how far a source that has nothing more to say lets the contr
 class Sampler(Protocol):
     """A source of references that knows when it will speak."""
 
-    def sample(self, t: float, feedback: NDArray[np.float64] | None = None) -> Reference | None:
+    def sample(self, t: float, feedback: Array | None = None) -> Reference | None:
         """The reference at an update instant [s], or None."""
 
     def silent_until(self, t: float) -> float:
@@ -42,7 +40,7 @@ class Narrator:
         self._heard = -math.inf
 
     def speak(
-        self, until: float, feedback: NDArray[np.float64] | None = None
+        self, until: float, feedback: Array | None = None
     ) -> Iterator[tuple[int, Reference | None]]:
         """Stamps [ns] with references, or with None for "nothing new up to and including it".
 
@@ -56,7 +54,7 @@ class Narrator:
             self._said = self._heard = following
         last_silent = math.ceil(min(following, until + FAR) * self._rate - 1e-3) - 1
         marker = tick_stamp(last_silent, self._rate)
-        if self._heard < until - 1e-9 or seconds(marker) > self._heard + 1.5 / self._rate:
-            if seconds(marker) > self._heard:
-                self._heard = seconds(marker)
-                yield marker, None
+        silence = seconds(marker) - self._heard
+        if silence > 1.5 / self._rate or (silence > 0.0 and self._heard < limit - 2e-9):
+            self._heard = seconds(marker)
+            yield marker, None

@@ -6,9 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-from numpy.typing import NDArray
-
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.operator.minimum_jerk import RestToRest
@@ -74,7 +72,7 @@ class FormationPlanner:
         )
         self._schedule = Schedule(settings.update_rate, [(self._start, math.inf)])
 
-    def sample(self, t: float, feedback: NDArray[np.float64] | None = None) -> Reference | None:
+    def sample(self, t: float, feedback: Array | None = None) -> Reference | None:
         """The planned motion at time `t` [s]; None before the first formation.
 
         Autonomy feels no feedback; the argument is there to be sampled as a hand is.

@@ -6,15 +6,15 @@ import math
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.errors import InputError
 from noninteract_ros.operator.motion import Motion
 
 
-def read_recording(path: str | Path, dim: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def read_recording(path: str | Path, dim: int) -> tuple[Array, Array]:
     """Reads a recorded motion.
 
     Args:
@@ -73,7 +73,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def replay(times: NDArray[np.float64], positions: NDArray[np.float64]) -> Motion:
+def replay(times: Array, positions: Array) -> Motion:
     """Replays a recording along its cubic spline, with the first sample at t = 0.
 
     The motion passes through every sample and is C2 between the first and the last. The spline's

@@ -3,10 +3,7 @@
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from noninteract_ros.arrays import Array
 
 
 def runge_kutta_step(

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import key
-from noninteract_ros.simulation.integrator import Array
 from noninteract_ros.team.team import Team
 
 

@@ -5,11 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from noninteract_ros.control.decoupling import task_dynamics
-from noninteract_ros.control.plain_form import decoupling_matrix
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError, one_of
 from noninteract_ros.schema import key
-from noninteract_ros.simulation.integrator import Array
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import TeamState
 
@@ -49,7 +47,6 @@ class SubtaskObject:
             if found not in stack.names:
                 raise ScenarioError(f"object.{name}", repr(found), one_of(stack.names, found))
         self._stack = stack
-        self._natural = (None,) * len(stack.names)
         self._carrying = stack.slices[stack.names.index(settings.carried_by)]
         self._grasping = stack.slices[stack.names.index(settings.grasped_by)]
         dim = self._grasping.stop - self._grasping.start
@@ -62,10 +59,17 @@ class SubtaskObject:
     def torque_terms(self, state: TeamState) -> tuple[Array, Array]:
         """A (n, n) and b (n,) of its torque A dv/dt + b: the mass feels the acceleration."""
         task = self._stack.evaluate(state)
-        dynamics = task_dynamics(state, task, self._stack.slices, self._natural)
-        gamma = decoupling_matrix(dynamics)
-        carried = self._mass * gamma[:, self._carrying]
+        S = np.linalg.inv(task.J)
+        carried, grasped = (
+            _decoupling_columns(state.M, S[:, part]) for part in (self._carrying, self._grasping)
+        )
         strain = self._stiffness * (task.x[self._grasping] - self._rest)
-        A = carried @ task.J[self._carrying]
-        b = carried @ (task.J_rate[self._carrying] @ state.v) + gamma[:, self._grasping] @ strain
-        return A, b
+        A = self._mass * carried @ task.J[self._carrying]
+        drift = self._mass * (task.J_rate[self._carrying] @ state.v)
+        return A, carried @ drift + grasped @ strain
+
+
+def _decoupling_columns(M: Array, S_i: Array) -> Array:
+    """Columns of Gamma that belong to one subtask: M S_i (S_i' M S_i)^-1, shape (n, p_i)."""
+    MS_i = M @ S_i
+    return np.linalg.solve(S_i.T @ MS_i, MS_i.T).T

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
-from noninteract_ros.simulation.integrator import Array, runge_kutta_step
+from noninteract_ros.simulation.integrator import runge_kutta_step
 from noninteract_ros.simulation.push import LivePush, ScheduledPush
 from noninteract_ros.simulation.subtask_object import SubtaskObject
 from noninteract_ros.team.team import Team

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Subtasks that mix the robots' tool points with constant weights."""
 
-import numpy as np
-
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.subtasks.subtask import Array, Subtask, SubtaskState
+from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.robot import AXES
 from noninteract_ros.team.team import Team, TeamState
 
@@ -24,7 +23,10 @@ class MixedPosition(Subtask):
     ) -> None:
         self.name, self.elements, self.axes = name, elements, axes
         self._weights = weights
-        self._rows = [AXES.index(axis) for axis in axes]
+        rows = [AXES.index(axis) for axis in axes]
+        ordered = rows == list(range(rows[0], rows[0] + len(rows)))
+        # A slice is a view; indices in another order need a copy.
+        self._rows = slice(rows[0], rows[-1] + 1) if ordered else rows
 
     def evaluate(self, state: TeamState) -> SubtaskState:
         """Value, Jacobian and Jacobian rate; the mixing is constant, so are its derivatives."""

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import SubtaskError
-from noninteract_ros.subtasks.subtask import Array, Subtask, SubtaskState
+from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.team import Team, TeamState
 
 _RANK_TRIALS = 4

@@ -4,12 +4,8 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
+from noninteract_ros.arrays import Array
 from noninteract_ros.team.team import TeamState
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)

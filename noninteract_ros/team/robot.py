@@ -3,9 +3,9 @@
 
 from dataclasses import dataclass
 
-import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
+
+from noninteract_ros.arrays import Array
 
 AXES = ("x", "y", "z")
 
@@ -26,6 +26,6 @@ class Robot:
     name: str
     model: pin.Model
     tool_frame: str
-    initial_position: NDArray[np.float64]
+    initial_position: Array
     axes: tuple[str, ...]
     brake_damping: float

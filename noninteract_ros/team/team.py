@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.errors import TeamError
 from noninteract_ros.team.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +69,7 @@ class Team:
         )
         self._data = self.model.createData()
         self._tools = [self.model.getFrameId(f"{r.name}/{r.tool_frame}") for r in robots]
-        self._no_velocity = np.zeros(self.n)
+        self._lower = np.tri(self.n, k=-1, dtype=bool)
 
     @staticmethod
     def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
@@ -83,8 +81,8 @@ class Team:
         model, data = self.model, self._data
         pin.computeAllTerms(model, data, q, v)
         pin.computeJointJacobiansTimeVariation(model, data, q, v)
-        M = np.triu(data.M)
-        M += np.triu(M, 1).T
+        M = data.M.copy()
+        np.copyto(M, M.T, where=self._lower)  # Pinocchio fills the upper triangle.
         C = pin.computeCoriolisMatrix(model, data, q, v).copy()
         g = pin.computeGeneralizedGravity(model, data, q).copy()
         count = len(self._tools)

@@ -24,18 +24,18 @@ def test_the_papers_formation_is_held_for_good():
     """One formation at time 0 is a still reference from the first instant on."""
     plan = planner(Formation(WIDE))
     for t in (0.0, 0.01, 1e4):
-        np.testing.assert_array_equal(plan.reference(t).position, WIDE)
-        np.testing.assert_array_equal(plan.reference(t).velocity, [0.0, 0.0])
+        np.testing.assert_array_equal(plan.sample(t).position, WIDE)
+        np.testing.assert_array_equal(plan.sample(t).velocity, [0.0, 0.0])
 
 
 def test_nothing_is_asked_before_the_first_formation():
     """Before its time there is no reference, and silent_until says when there will be."""
     plan = planner(Formation(WIDE, time=1.5))
-    assert plan.reference(1.49) is None
+    assert plan.sample(1.49) is None
     assert plan.silent_until(0.0) == 1.5
     assert plan.silent_until(1.5) == 1.51
     assert plan.next_update(0.0) == 0.01
-    np.testing.assert_array_equal(plan.reference(1.5).position, WIDE)
+    np.testing.assert_array_equal(plan.sample(1.5).position, WIDE)
 
 
 @pytest.mark.parametrize("rate", [100.0, 30.0, 7.0])
@@ -44,8 +44,8 @@ def test_there_is_a_reference_wherever_silence_ends(rate):
     for start in [*np.random.default_rng(4).uniform(0.0, 3.0, 50).tolist(), 1 / 3, 0.1 + 0.2]:
         plan = planner(Formation(WIDE, time=start), rate=rate)
         first = plan.silent_until(-1.0)
-        assert plan.reference(first) is not None
-        assert plan.reference(first - 1.0 / rate) is None
+        assert plan.sample(first) is not None
+        assert plan.sample(first - 1.0 / rate) is None
 
 
 def test_changes_are_minimum_jerk_between_rests():
@@ -57,7 +57,7 @@ def test_changes_are_minimum_jerk_between_rests():
     )
     expected = waypoints([0, 2, 5, 6, 7], [WIDE, WIDE, NARROW, NARROW, TURNED])
     for t in np.linspace(0.0, 8.0, 161):
-        now, then = plan.reference(t), expected(t)
+        now, then = plan.sample(t), expected(t)
         np.testing.assert_allclose(now.position, then.position, atol=1e-15)
         np.testing.assert_allclose(now.velocity, then.velocity, atol=1e-15)
         np.testing.assert_allclose(now.acceleration, then.acceleration, atol=1e-14)
@@ -66,8 +66,8 @@ def test_changes_are_minimum_jerk_between_rests():
 def test_a_change_may_begin_where_the_last_one_ends():
     """Changes that touch do not overlap."""
     plan = planner(Formation(WIDE), Formation(NARROW, 0.0, 1.0), Formation(TURNED, 1.0, 2.0))
-    np.testing.assert_array_equal(plan.reference(1.0).position, NARROW)
-    np.testing.assert_array_equal(plan.reference(math.pi).position, TURNED)
+    np.testing.assert_array_equal(plan.sample(1.0).position, NARROW)
+    np.testing.assert_array_equal(plan.sample(math.pi).position, TURNED)
 
 
 @pytest.mark.parametrize(
