@@ -6,6 +6,7 @@ recorder never wrote, or take a short read for a whole record.
 """
 
 import struct
+import zlib
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
@@ -15,7 +16,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Chunk
+from mcap.records import Attachment, Chunk
 from mcap.stream_reader import get_chunk_data_stream
 
 from noninteract_ros.errors import RecordingError
@@ -122,6 +123,18 @@ def unpack_chunk(body: bytes) -> bytes:
         return stream.read(size)
     except DAMAGE as error:
         raise DamagedError(f"a chunk of {len(body)} bytes is damaged: {error}") from error
+
+
+def read_attachment(body: bytes) -> Attachment:
+    """Reads an attachment record.
+
+    Raises:
+        DamagedError: Its check sum is wrong.
+    """
+    expected = int.from_bytes(body[-4:], "little")
+    if expected and zlib.crc32(body[:-4]) != expected:
+        raise DamagedError(f"an attachment of {len(body)} bytes is damaged")
+    return Attachment.read(open_record(body))
 
 
 def split_records(data: bytes) -> Iterator[tuple[int, bytes]]:

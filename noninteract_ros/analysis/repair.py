@@ -8,7 +8,7 @@ from tempfile import NamedTemporaryFile
 from typing import IO
 
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Header, Metadata, Schema
+from mcap.records import Channel, Header, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from noninteract_ros.analysis import records
@@ -41,9 +41,10 @@ class RepairReport:
     def __str__(self) -> str:
         if self.intact:
             return f"{self.path}: nothing to repair, {self.messages} messages"
+        more = f"; {len(self.reasons) - 3} more" if len(self.reasons) > 3 else ""
         return (
             f"{self.path}: kept {self.messages} messages, left out {self.lost_bytes} bytes "
-            f"({'; '.join(self.reasons)})"
+            f"({'; '.join(self.reasons[:3])}{more})"
         )
 
 
@@ -159,7 +160,7 @@ class _Copy:
                     channel.metadata,
                 )
         elif opcode == Opcode.ATTACHMENT:
-            item = Attachment.read(content)
+            item = records.read_attachment(body)
             self._writer.add_attachment(
                 item.create_time, item.log_time, item.name, item.media_type, item.data
             )

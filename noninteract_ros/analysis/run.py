@@ -9,7 +9,7 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Schema
+from mcap.records import Channel, Schema
 from mcap_ros2.decoder import DecoderFactory
 from numpy.typing import NDArray
 
@@ -245,6 +245,6 @@ class _Loader:
             key = channel.topic, schema.name
             self._channels[channel.id] = self.topics.setdefault(key, Topic(channel.topic, schema))
         elif opcode == Opcode.ATTACHMENT:
-            attachment = Attachment.read(records.open_record(body))
+            attachment = records.read_attachment(body)
             if attachment.name == SCENARIO:
                 self.scenario = attachment.data.decode()

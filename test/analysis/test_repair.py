@@ -89,6 +89,16 @@ def test_damage_in_the_middle_costs_one_chunk(recording: Path) -> None:
     assert "damaged" in report.reasons[0]
 
 
+def test_a_damaged_scenario_costs_no_message(recording: Path) -> None:
+    """A scenario whose check sum fails is left out and said, never passed on altered."""
+    data = recording.read_bytes().replace(b"rate: 1000.0", b"rate: 9000.0", 1)
+    recording.write_bytes(data)
+    report = repair(recording)
+    assert report.messages == MESSAGES
+    assert "an attachment" in str(report)
+    assert Run.open(recording).scenario is None
+
+
 def test_a_tail_of_zeros_is_cut(recording: Path) -> None:
     """A file that a crashed system left with a gap ends at the gap."""
     data = recording.read_bytes()

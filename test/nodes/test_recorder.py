@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The recorder as a process of its own, and its node in this process."""
+
+import gc
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import rclpy
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.signals import SignalHandlerOptions
+from sensor_msgs.msg import JointState
+
+from noninteract_ros.analysis.repair import repair
+from noninteract_ros.analysis.run import Run
+from noninteract_ros.errors import RecordingError
+from noninteract_ros.nodes.feed import SequenceCheck
+from noninteract_ros.nodes.recorder import RecorderNode
+
+WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
+DOMAIN = 60 + WORKER % 10
+DEADLINE = 30.0
+TICKS = 1000
+TOPICS = ("joint_states", "joint_commands", "cooperative/state")
+
+# Three topics at 1 kHz, as a run has them; says when it has begun and when all has arrived.
+PUBLISHER = f"""
+import time, rclpy
+from rclpy.duration import Duration
+from sensor_msgs.msg import JointState
+
+rclpy.init()
+node = rclpy.create_node("publisher", namespace="team")
+publishers = [node.create_publisher(JointState, topic, 2000) for topic in {TOPICS!r}]
+while not all(publisher.get_subscription_count() for publisher in publishers):
+    time.sleep(0.01)
+message = JointState(name=["robot_1/x", "robot_1/y"])
+start = time.monotonic()
+for tick in range({TICKS}):
+    message.header.stamp.sec, message.header.stamp.nanosec = tick // 1000, tick % 1000 * 10**6
+    for number, publisher in enumerate(publishers):
+        message.position = [float(tick), float(number)]
+        publisher.publish(message)
+    if tick == 300:
+        print("going", flush=True)
+    time.sleep(max(0.0, start + 0.001 * (tick + 1) - time.monotonic()))
+for publisher in publishers:
+    publisher.wait_for_all_acked(Duration(seconds=5))
+"""
+
+
+@pytest.fixture
+def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Starts Python processes in a domain of their own, and ends those that are left."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    started = []
+
+    def run(*arguments: str) -> subprocess.Popen[str]:
+        pipe = subprocess.PIPE
+        command = [sys.executable, *arguments]
+        started.append(subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True))
+        return started[-1]
+
+    yield run
+    for process in started:
+        process.kill()
+        process.communicate()
+
+
+def recorder_arguments(**parameters: object) -> list[str]:
+    given = [item for key, value in parameters.items() for item in ("-p", f"{key}:={value}")]
+    return ["-m", "noninteract_ros.nodes.recorder", "--ros-args", *given]
+
+
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
+def test_every_message_is_recorded_until_a_signal(
+    start: Callable[..., subprocess.Popen[str]], tmp_path: Path, ending: signal.Signals
+) -> None:
+    """At 1 kHz on three topics nothing is lost, and a signal ends with a whole file, status 0."""
+    scenario = tmp_path / "scenario.yaml"
+    scenario.write_text("/**: {ros__parameters: {rate: 1000.0}}\n")
+    path = tmp_path / "new" / "run.mcap"
+    known = str([f"{topic} sensor_msgs/msg/JointState" for topic in TOPICS[:2]])
+    recorder = start(*recorder_arguments(output=path, topics=known, scenario_file=scenario))
+    publisher = start("-c", PUBLISHER)
+    assert publisher.wait(DEADLINE) == 0
+    assert recorder.poll() is None, recorder.communicate()
+    recorder.send_signal(ending)
+    out, error = recorder.communicate(timeout=DEADLINE)
+    assert recorder.returncode == 0, error
+    assert f"{path}: " in out
+    run = Run.open(path.parent)
+    assert run.scenario == scenario.read_text()
+    for number, topic in enumerate(TOPICS):
+        found = run.joints(f"/team/{topic}")
+        np.testing.assert_array_equal(found.position[:, 0], np.arange(TICKS))
+        assert (found.position[:, 1] == number).all()
+        assert (run.log_times(topic) >= run.publish_times(topic)).all()
+    status = [item for item in run.diagnostics() if item["name"] == "/team/recorder"][-1]
+    assert (status["level"], status["message"]) == (0, "recording")
+    assert (status["values"]["lost"], status["values"]["sent before the recorder"]) == ("0", "0")
+
+
+def test_a_killed_recorder_leaves_a_file_that_can_be_repaired(
+    start: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    """After kill -9 in the middle of a run, all but its last moments are there."""
+    path = tmp_path / "run.mcap"
+    recorder = start(*recorder_arguments(output=path))
+    publisher = start("-c", PUBLISHER)
+    assert publisher.stdout is not None
+    assert publisher.stdout.readline() == "going\n"
+    deadline = time.monotonic() + DEADLINE
+    while path.stat().st_size < 10_000:
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+    recorder.kill()
+    recorder.wait(DEADLINE)
+    with pytest.raises(RecordingError, match="noninteract repair"):
+        Run.open(path)
+    assert not repair(path).intact
+    ticks = Run.open(path).joints("joint_states").position[:, 0]
+    np.testing.assert_array_equal(ticks, np.arange(len(ticks)))
+    assert len(ticks) > 100
+
+
+@pytest.mark.parametrize(
+    ("parameters", "complaint"),
+    [
+        ({}, "run.mcap: exists and is not overwritten"),
+        ({"output": "{}/run.mcap/run.mcap"}, "run.mcap/run.mcap: cannot be written"),
+        ({"scenario_file": "{}/nothing.yaml"}, "nothing.yaml: cannot be read"),
+        ({"topics": "[joint_states]"}, "parameter topics: found 'joint_states'"),
+        ({"topics": "['a x/msg/X y']"}, "parameter topics: found 'a x/msg/X y'"),
+        ({"topics": "['1/ x/msg/X']"}, "parameter topics: Invalid topic name"),
+        ({"overwrite": "7"}, "overwrite"),
+    ],
+)
+def test_what_cannot_be_recorded_is_said_in_one_line(
+    start: Callable[..., subprocess.Popen[str]],
+    tmp_path: Path,
+    parameters: dict[str, str],
+    complaint: str,
+) -> None:
+    """A wrong parameter or path ends the program with status 2, and nothing is touched."""
+    (tmp_path / "run.mcap").write_bytes(b"precious")
+    given = {"output": "{}/run.mcap"} | parameters
+    recorder = start(
+        *recorder_arguments(**{key: value.format(tmp_path) for key, value in given.items()})
+    )
+    _, error = recorder.communicate(timeout=DEADLINE)
+    assert recorder.returncode == 2, error
+    assert len(error.splitlines()) == 1
+    assert complaint in error
+    assert (tmp_path / "run.mcap").read_bytes() == b"precious"
+
+
+FULL_DISK = """
+import resource, sys
+from noninteract_ros.nodes.recorder import main
+
+resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
+sys.exit(main())
+"""
+
+
+def test_a_full_disk_ends_the_recorder_with_the_reason(
+    start: Callable[..., subprocess.Popen[str]], tmp_path: Path
+) -> None:
+    """Status 2, one line, and what was written before can be repaired."""
+    path = tmp_path / "run.mcap"
+    recorder = start("-c", FULL_DISK, *recorder_arguments(output=path)[2:])
+    start("-c", PUBLISHER)
+    _, error = recorder.communicate(timeout=DEADLINE)
+    assert recorder.returncode == 2
+    assert error.splitlines() == [f"recorder: {path}: cannot be written: File too large"]
+    assert repair(path).messages > 0
+
+
+@pytest.fixture
+def ros() -> Iterator[tuple[Any, Callable[..., RecorderNode]]]:
+    """A node that publishes, and a maker of recorders, in a context of their own."""
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    context = rclpy.Context()
+    rclpy.init(context=context, domain_id=DOMAIN, signal_handler_options=SignalHandlerOptions.NO)
+    nodes = [rclpy.create_node("publisher", namespace="team", context=context)]
+
+    def make(path: Path, **parameters: Any) -> RecorderNode:
+        values = {"output": str(path)} | parameters
+        overrides = [Parameter(key, value=value) for key, value in values.items()]
+        nodes.append(RecorderNode(context=context, parameter_overrides=overrides))
+        return nodes[-1]
+
+    yield nodes[0], make
+    for node in nodes:
+        node.destroy_node()
+    nodes.clear()
+    context.try_shutdown()
+    gc.collect()
+    context.destroy()
+
+
+def poll_until(recorder: RecorderNode, done: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + DEADLINE
+    while not done():
+        assert time.monotonic() < deadline
+        recorder.poll()
+        time.sleep(0.002)
+
+
+def test_topics_of_the_namespace_only(ros: Any, tmp_path: Path) -> None:
+    """Topics that appear are found; those of other namespaces are left alone."""
+    node, make = ros
+    recorder = make(tmp_path / "run.mcap")
+    ours = node.create_publisher(JointState, "late/topic", 10)
+    other = node.create_publisher(JointState, "/other/topic", 10)
+    poll_until(recorder, lambda: ours.get_subscription_count() > 0)
+    other.publish(JointState())
+    ours.publish(JointState())
+    poll_until(recorder, lambda: recorder.writer.topics == 2)
+    recorder.finish()
+    assert set(Run.open(tmp_path).topics) == {"/team/late/topic", "/diagnostics"}
+
+
+def test_best_effort_publishers_are_heard(ros: Any, tmp_path: Path) -> None:
+    """A publisher that offers no reliability is recorded all the same."""
+    node, make = ros
+    recorder = make(tmp_path / "run.mcap", topics=["sensor sensor_msgs/msg/JointState"])
+    qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    publisher = node.create_publisher(JointState, "sensor", qos)
+
+    def heard() -> bool:
+        publisher.publish(JointState())
+        return recorder.writer.topics == 2
+
+    poll_until(recorder, heard)
+    recorder.finish()
+    assert "/team/sensor" in Run.open(tmp_path).topics
+
+
+def test_an_unknown_type_is_left_out(ros: Any, tmp_path: Path) -> None:
+    """A message package that is not installed costs its topic only, and is said."""
+    node, make = ros
+    recorder = make(
+        tmp_path / "run.mcap",
+        topics=["a nothing_msgs/msg/Nothing", "b sensor_msgs/msg/JointState"],
+    )
+    publisher = node.create_publisher(JointState, "b", 10)
+    poll_until(recorder, lambda: publisher.get_subscription_count() > 0)
+    publisher.publish(JointState())
+    poll_until(recorder, lambda: recorder.writer.topics == 2)
+    recorder.finish()
+    run = Run.open(tmp_path)
+    assert set(run.topics) == {"/team/b", "/diagnostics"}
+    assert (
+        run.diagnostics()[-1]["level"],
+        run.diagnostics()[-1]["values"]["topics left out"],
+    ) == (
+        1,
+        "1",
+    )
+
+
+@pytest.mark.parametrize(
+    ("publishers", "numbers", "lost", "late"),
+    [
+        (1, [1, 2, 3], 0, 0),
+        (1, [4, 5, 6], 0, 3),
+        (1, [1, 2, 6, 7, 9], 4, 0),
+        (1, [1, 2, 3, 1, 2, 3], 0, 0),
+        (1, [1, 2, 3, 1, 2, 5], 2, 0),
+        (2, [1, 1, 2, 2, 3, 4, 3, 4], 0, 0),
+        (2, [1, 2, 40, 3, 41, 42, 4], 0, 39),
+        (2, [1, 2, 40, 3, 41, 44, 4], 2, 39),
+    ],
+)
+def test_gaps_in_the_numbers_are_counted(
+    publishers: int, numbers: list[int], lost: int, late: int
+) -> None:
+    """Gaps count as lost, a beginning above one as sent before, a restart as neither."""
+    check = SequenceCheck(lambda: publishers)
+    for number in numbers:
+        check.note(number)
+    assert (check.lost, check.late) == (lost, late)
