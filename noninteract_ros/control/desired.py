@@ -6,15 +6,20 @@ acceleration and jerk. A full reference passes unchanged once it has been taken 
 """
 
 import numpy as np
-from ruckig import ControlInterface, InputParameter, OutputParameter, Result, Ruckig
+from ruckig import ControlInterface, InputParameter, OutputParameter, Result, Ruckig, RuckigError
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.inputs import Motion, Rate, Target
 from noninteract_ros.control.reference import Reference
 
+LONGEST = 1000.0  # [s] how far ahead a motion is planned
+
 
 class Shaper:
     """One step at a time towards a state, within limits.
+
+    An acceleration beyond the limits is cut off at once: to lead it back with bounded jerk would
+    carry the motion far away. A start from which no motion can be planned becomes rest.
 
     Args:
         limits: Bounds of velocity, acceleration and jerk, shape (3, p).
@@ -25,12 +30,15 @@ class Shaper:
         self._generator = Ruckig(dim, 1.0)
         self._input, self._output = InputParameter(dim), OutputParameter(dim)
         self._input.max_velocity, self._input.max_acceleration, self._input.max_jerk = limits
-        self._max_velocity = limits[0]
+        self._max_velocity, self._max_acceleration, _ = limits
 
     def towards(self, start: Reference, target: Target, step: float) -> tuple[Reference, bool]:
         """State `step` seconds on the way to a set-point, and whether it is reached."""
         self._input.control_interface = ControlInterface.Position
-        self._input.target_position = target.position
+        reach = LONGEST * self._max_velocity
+        away = np.clip(target.position - start.position, -reach, reach)
+        near = np.abs(away) < reach
+        self._input.target_position = np.where(near, target.position, start.position + away)
         return self._advance(start, target.velocity, step)
 
     def at_rate(self, start: Reference, rate: Array, step: float) -> tuple[Reference, bool]:
@@ -42,11 +50,15 @@ class Shaper:
         self._generator.delta_time = step
         self._input.current_position = start.position
         self._input.current_velocity = start.velocity
-        self._input.current_acceleration = start.acceleration
+        bound = self._max_acceleration
+        self._input.current_acceleration = np.clip(start.acceleration, -bound, bound)
         self._input.target_velocity = np.clip(speed, -self._max_velocity, self._max_velocity)
-        result = self._generator.update(self._input, self._output)
+        try:
+            result = self._generator.update(self._input, self._output)
+        except (RuckigError, ValueError):  # ValueError: it has no name for some of its failures.
+            result = Result.Error
         if result not in (Result.Working, Result.Finished):
-            raise ArithmeticError(f"no trajectory from {start} within the limits: {result}")
+            return Reference.still(start.position), False
         reached = Reference(
             np.array(self._output.new_position),
             np.array(self._output.new_velocity),
@@ -115,8 +127,8 @@ class DesiredMotion:
         if self._direct:
             return motion
         if self._jumps(motion, step):
-            self._gap = _difference(self._now.at(step), motion)
-        elif self._gap is not None:
+            self._gap = _difference(self._now, motion.at(-step))
+        if self._gap is not None and step > 0.0:
             self._gap, closed = self._shaper.towards(self._gap, self._zero, step)
             if closed:
                 self._gap = None

@@ -2,6 +2,7 @@
 """Who leads a subtask: authority, silence and the desired motion that results."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from noninteract_ros.schema import key
 from noninteract_ros.subtasks.subtask import Subtask
 
 AUTHORITIES = (*SOURCES, "hold")
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,9 @@ class SubtaskInput:
         self._desired.rest_at(x)
         self._force = np.zeros_like(x)
 
-    def resting(self) -> Led:
-        """At rest where it is, whatever the sources say."""
+    def resting(self, now: float) -> Led:
+        """At rest where it is, whatever the sources say up to `now` [s]."""
+        self._take(now)
         return Led(self._desired.now, self._force, "hold", False)
 
     def forget(self) -> None:
@@ -104,29 +107,32 @@ class SubtaskInput:
             now: The team's time [s].
             step: Time since the last tick [s].
         """
+        self._take(now)
+        source = self.sources.get(self.authority)
+        motion = self._fresh(source.motion(now), now) if source else None
+        force = self._fresh(source.force(now), now) if source else None
+        self._force = self._shaped(force[1].force if force else np.zeros_like(self._force), step)
+        reference = self._desired.advance(_as_of(now, *motion) if motion else None, step)
+        silent = source is not None and motion is None and force is None
+        return Led(reference, self._force, self.authority, silent)
+
+    def _take(self, now: float) -> None:
+        """Takes what has come due, so that no input piles up, of whatever source."""
         for source in self.sources.values():
             source.motion(now)
             source.force(now)
-        motion = self._motion(now)
-        self._force = self._shaped_force(now, step)
-        silent = motion is None and self.authority != "hold"
-        reference = self._desired.advance(motion, step)
-        return Led(reference, self._force, self.authority, silent)
 
-    def _motion(self, now: float) -> Motion | None:
-        if self.authority == "hold":
-            return None
-        newest = self.sources[self.authority].motion(now)
-        if newest is None or now - newest[0] > self._timeout:
-            return None
-        stamp, motion = newest
-        return motion.at(now - stamp) if isinstance(motion, Reference) else motion
+    def _fresh(self, newest: tuple[float, Item] | None, now: float) -> tuple[float, Item] | None:
+        """An input that is not older than the timeout."""
+        return newest if newest is not None and now - newest[0] <= self._timeout else None
 
-    def _shaped_force(self, now: float, step: float) -> Array:
-        wanted = np.zeros_like(self._force)
-        if self.authority != "hold":
-            newest = self.sources[self.authority].force(now)
-            if newest is not None and now - newest[0] <= self._timeout:
-                wanted = np.clip(newest[1].force, -self._max_force, self._max_force)
+    def _shaped(self, wanted: Array, step: float) -> Array:
+        """The force input one tick later, within its bounds."""
+        bounded = np.clip(wanted, -self._max_force, self._max_force)
         change = self._max_force_rate * step
-        return self._force + np.clip(wanted - self._force, -change, change)
+        return self._force + np.clip(bounded - self._force, -change, change)
+
+
+def _as_of(now: float, stamp: float, motion: Motion) -> Motion:
+    """What a motion that was given for `stamp` asks for now."""
+    return motion.at(now - stamp) if isinstance(motion, Reference) else motion

@@ -21,7 +21,7 @@ from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import Team, TeamState
 
-JUMP = 0.1  # [m or rad] a coordinate that moves further in one tick has been put elsewhere
+JUMP = 0.1  # [m or rad] a coordinate that is this much further than it can have come was put there
 
 
 @dataclass(frozen=True)
@@ -162,12 +162,14 @@ class TeamController:
         """
         state = self.team.state(q, v)
         task = self.stack.evaluate(state)
-        restarted = self._restart_reason(now, q)
+        restarted = self._restart_reason(now, q, v)
         step = 0.0 if restarted or self._last is None else now - self._last[0]
-        if restarted or self._mode.stopped or (self._left and self._left.stopped):
+        # At the tick of a stop the inputs still count, so that the torque starts without a step.
+        stopped = self._mode.stopped and (self._left is None or self._left.stopped)
+        if restarted or stopped or (self._left and self._left.stopped):
             self._rest_at(task.x)
         led = tuple(
-            item.resting() if self._mode.stopped else item.advance(now, step)
+            item.resting(now) if stopped else item.advance(now, step)
             for item in self.inputs.values()
         )
         error = _error(task, v, led)
@@ -199,14 +201,14 @@ class TeamController:
             external_torque,
         )
 
-    def _restart_reason(self, now: float, q: Array) -> str:
+    def _restart_reason(self, now: float, q: Array, v: Array) -> str:
         if self._last is None:
             return "the first state"
         last, q_last = self._last
         if now - last > self._state_timeout:
             return f"no state for {now - last:.3f} s"
         moved = np.abs(q - q_last)
-        if moved.max() > JUMP:
+        if (moved > JUMP + 2.0 * np.abs(v) * (now - last)).any():
             joint = self.team.joint_names[int(moved.argmax())]
             return f"{joint} jumped by {moved.max():.3f}"
         return ""

@@ -43,7 +43,6 @@ class TeamSimulation:
         self._held, self._pushes = held, tuple(pushes)
         self._live: dict[str, LivePush] = {}
         self.tick = 0
-        self._acceleration = np.zeros(team.n)
         self.reset()
 
     @property
@@ -70,8 +69,8 @@ class TeamSimulation:
 
     def step(self, torque: Array | None) -> None:
         """One tick under a control torque, shape (n,); None brakes by damping and gravity."""
-        pushes = self._push_wrenches()
-        still = self._held is None and not pushes.any()
+        pushed = self._push_wrenches(self.q).any()
+        still = self._held is None and not pushed
 
         def applied(q: Array, v: Array) -> Array:
             if torque is not None:
@@ -81,7 +80,7 @@ class TeamSimulation:
         def acceleration(q: Array, v: Array) -> Array:
             if still:
                 return self.team.forward_dynamics(q, v, applied(q, v))
-            return self._loaded_acceleration(q, v, applied(q, v), pushes)
+            return self._loaded_acceleration(q, v, applied(q, v))
 
         self.torque = applied(self.q, self.v)
         integrate = self.team.integrate
@@ -89,21 +88,22 @@ class TeamSimulation:
         self.tick += 1
         self._live = {name: push for name, push in self._live.items() if push.until > self.now}
 
-    def _push_wrenches(self) -> Array:
-        """Pushes on each tool now, world axes, shape (N, 6) [N, N m]."""
+    def _push_wrenches(self, q: Array) -> Array:
+        """Pushes on each tool of a team at q now, world axes, shape (N, 6) [N, N m]."""
         wrenches = np.zeros((len(self.team.names), 6))
         for push in self._pushes:
             wrenches[self.team.index(push.robot)] += push.wrench(self.now)
         if self._live:
-            rotations = self.team.tool_rotations(self.q)
+            rotations = self.team.tool_rotations(q)
         for name, live in self._live.items():
             i = self.team.index(name)
             R = rotations[i] if live.in_tool_axes else np.eye(3)
             wrenches[i] += np.concatenate([R @ live.wrench[:3], R @ live.wrench[3:]])
         return wrenches
 
-    def _loaded_acceleration(self, q: Array, v: Array, torque: Array, pushes: Array) -> Array:
+    def _loaded_acceleration(self, q: Array, v: Array, torque: Array) -> Array:
         """Acceleration with everything that acts from outside; the object's mass is implicit."""
+        pushes = self._push_wrenches(q)
         state = self.team.state(q, v)
         total = torque + self.team.external_torque(state, pushes) - state.C @ v - state.g
         if self._held is None:
@@ -117,10 +117,10 @@ class TeamSimulation:
         World axes, at the tool point [N, N m]. What the object exerts is reported as the smallest
         wrench on each tool that has its joint torque.
         """
-        wrenches = self._push_wrenches()
+        wrenches = self._push_wrenches(self.q)
         if self._held is None:
             return wrenches
         state = self.team.state(self.q, self.v)
-        acceleration = self._loaded_acceleration(self.q, self.v, self.torque, wrenches)
+        acceleration = self._loaded_acceleration(self.q, self.v, self.torque)
         A, b = self._held.torque_terms(state)
         return wrenches + self.team.tool_wrenches(state, A @ acceleration + b)
