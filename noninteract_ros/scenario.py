@@ -60,6 +60,9 @@ class General:
     stop_rate: float = key("Decay rate of the velocity after a stop [1/s]", 10.0, positive=True)
     pushes: tuple[str, ...] = key("Names of pushes; each has a block of that name", ())
     publish_clock: bool = key("Whether robot_team publishes /clock", False)
+    end_time: float = key(
+        "Time at which robot_team stops for good, as a demo does [s]; 0: never", 0.0, minimum=0.0
+    )
     start_paused: bool = key("Whether robot_team waits for ~/pause before its first tick", False)
 
 

@@ -89,6 +89,8 @@ class ScenarioNode(Node):
     def publish_diagnostics(self) -> None:
         """Says how the node is."""
         level, text, values = self.status()
+        matched = [(item.topic_name, item.get_subscription_count()) for item in self.publishers]
+        values["subscribers"] = ", ".join(f"{topic} {count}" for topic, count in matched)
         if self._refused:
             values["refused inputs"] = sum(self._refused.values())
             values["last refusal"] = self._last_refusal

@@ -46,10 +46,15 @@ def rewrite(arguments: Sequence[str], folder: Path) -> list[str]:
     result = list(arguments)
     for place in range(1, len(result)):
         if result[place - 1] == OPTION:
-            content = _plain(_checked(result[place]))
+            content = _checked(result[place])
             result[place] = str(folder / f"{place}.yaml")
-            Path(result[place]).write_text(yaml.dump(content, Dumper=_Quoted))
+            Path(result[place]).write_text(dump(content))
     return result
+
+
+def dump(content: Mapping[str, Any]) -> str:
+    """A parameter file's text that ROS reads as it is meant."""
+    return yaml.dump(_plain(content), Dumper=_Quoted, sort_keys=False)
 
 
 def file_of_key(paths: Sequence[str], key: str) -> str | None:

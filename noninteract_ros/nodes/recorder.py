@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import Any
 
@@ -21,10 +22,10 @@ from rclpy.validate_topic_name import validate_topic_name
 from noninteract_ros.analysis.definitions import definition
 from noninteract_ros.analysis.recording import RunWriter
 from noninteract_ros.analysis.run import FILE_NAME
-from noninteract_ros.errors import InputError, RecordingError
+from noninteract_ros.errors import InputError, NoninteractError, RecordingError
 from noninteract_ros.nodes.feed import Feed
 from noninteract_ros.nodes.messages import Level, to_diagnostics, to_status
-from noninteract_ros.nodes.parameter_files import files_of
+from noninteract_ros.nodes.parameter_files import files_of, rewrite
 
 GLOBAL_TOPICS = ("/diagnostics", "/clock")
 POLL_PERIOD = 0.004
@@ -232,14 +233,16 @@ def main(args: Sequence[str] | None = None) -> int:
     """
     stop = StopSignal()
     argv = list(sys.argv if args is None else args)
-    rclpy.init(args=argv, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        node = RecorderNode(next(iter(files_of(argv)), ""))
+        with TemporaryDirectory() as folder:
+            ros_arguments = rewrite(argv, Path(folder))
+            rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
+            node = RecorderNode(next(iter(files_of(argv)), ""))
         node.run(lambda: stop.came)
         writer = node.writer
         lost = f", {node.lost} lost" if node.lost else ""
         print(f"{writer.path}: {writer.messages} messages on {writer.topics} topics{lost}")
-    except (RecordingError, InvalidParameterTypeException) as error:
+    except (NoninteractError, InvalidParameterTypeException) as error:
         print(f"recorder: {error}", file=sys.stderr)
         return 2
     finally:

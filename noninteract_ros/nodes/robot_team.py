@@ -47,6 +47,7 @@ class RobotTeam(ScenarioNode):
         self._command: tuple[int, np.ndarray] | None = None
         self._command_at = -np.inf
         self._braking = False
+        self._end_tick = round(general.end_time * general.rate) if general.end_time else None
         self._publish_to = self.create_publisher(JointState, "joint_states", LOOP_QOS)
         self._wrenches = [
             self.create_publisher(WrenchStamped, f"{name}/external_wrench", LOOP_QOS)
@@ -85,9 +86,14 @@ class RobotTeam(ScenarioNode):
 
     def _advance(self, torque: np.ndarray | None) -> None:
         """One tick, then the state that follows."""
+        if self._finished():
+            return
         self._simulation.step(torque)
         self._command = self._command if not self.lockstep else None
         self._publish()
+
+    def _finished(self) -> bool:
+        return self._end_tick is not None and self._simulation.tick >= self._end_tick
 
     def _publish(self) -> None:
         simulation = self._simulation
@@ -113,7 +119,8 @@ class RobotTeam(ScenarioNode):
         """Sends an unanswered state again: the first one, or one whose answer was lost."""
         with self._lock:
             waiting = time.monotonic() - self._sent_at > RESEND_PERIOD
-            if waiting and not self._paused and self._command is None:
+            idle = self._paused or self._finished()
+            if waiting and not idle and self._command is None:
                 self._publish()
 
     def loop(self) -> None:
@@ -174,6 +181,8 @@ class RobotTeam(ScenarioNode):
             "robots": len(self._team.names),
             "command age [s]": age,
         }
+        if self._finished():
+            return Level.OK, "finished", values
         if self._paused:
             return Level.OK, "paused", values
         if self._command_at == -np.inf:

@@ -8,8 +8,8 @@ from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
-from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
+from noninteract_ros.control.reference import Reference
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.lockstep import StampOrder
 from noninteract_ros.nodes.messages import Level, SubtaskCodec
@@ -48,8 +48,10 @@ class SourceNode(ScenarioNode):
         self._began: int | None = None
         self._stamp = -1
         self._state_at = -np.inf
-        self._feedback = np.zeros(task.dim)
+        self._feedback: Array = np.zeros(task.dim)
         self._sent = 0
+        self._last_words: list[bytes] = []
+        self._listeners = 0
         topic = f"{subtask}/{source}/reference"
         self._publish_to = self.create_publisher(MultiDOFJointTrajectory, topic, LOOP_QOS)
         self.subscribe(JointState, "joint_states", self._on_state, raw=True)
@@ -61,6 +63,10 @@ class SourceNode(ScenarioNode):
         if self._order.check("joint_states", stamp):
             self._began = None
         self._state_at = time.monotonic()
+        if stamp == self._stamp and self._began is not None:
+            self._repeat()
+            return
+        self._last_words = []
         if self._began is None:
             self._began = stamp
             self._narrator.begin(seconds(stamp))
@@ -84,15 +90,26 @@ class SourceNode(ScenarioNode):
         feedback = self._feedback if self._feels else None
         for stamp, reference in self._narrator.speak(until, feedback):
             if reference is None:
-                self._publish_to.publish(self._codec.encode_marker(stamp))
+                words = self._codec.encode_marker(stamp)
             else:
-                self._publish(
-                    stamp, reference.position, reference.velocity, reference.acceleration
-                )
+                words = self._encode(stamp, reference)
+            self._last_words.append(words)
+            self._publish_to.publish(words)
+        self._listeners = self._publish_to.get_subscription_count()
 
-    def _publish(self, stamp: int, *motion: Array) -> None:
-        self._publish_to.publish(self._codec.encode(stamp, *motion))
+    def _repeat(self) -> None:
+        """Says it again where a state is sent again and somebody joined who cannot have heard."""
+        listeners = self._publish_to.get_subscription_count()
+        if listeners > self._listeners:
+            for words in self._last_words:
+                self._publish_to.publish(words)
+        self._listeners = listeners
+
+    def _encode(self, stamp: int, reference: Reference) -> bytes:
         self._sent += 1
+        return self._codec.encode(
+            stamp, reference.position, reference.velocity, reference.acceleration
+        )
 
     def loop(self) -> None:
         """Wall time: one reference per update period, while the team is there."""
@@ -106,7 +123,7 @@ class SourceNode(ScenarioNode):
             feedback = self._feedback if self._feels else None
             reference = self._sampler.sample(seconds(now - self._began), feedback)
             if reference is not None:
-                self._publish(now, reference.position, reference.velocity, reference.acceleration)
+                self._publish_to.publish(self._encode(now, reference))
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
         """Whether the team is there, and what was sent."""

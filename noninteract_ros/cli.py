@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The command line: `noninteract demo | report | check | repair | bench`."""
+
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+# Matrices of a team are small; BLAS threads would only fight over the cores. Set before numpy.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from noninteract_ros import __version__
+from noninteract_ros.errors import NoninteractError, ScenarioError
+
+app = typer.Typer(
+    help="Robot teams led by a human: demos, reports, checks and measurements.",
+    no_args_is_help=True,
+    add_completion=False,
+)
+console = Console()
+
+
+def main() -> int:
+    """Entry point: 0 where all is well, 1 where a run or a check failed, 2 on wrong input."""
+    try:
+        code = app(standalone_mode=False)
+    except ScenarioError as error:
+        print(error, file=sys.stderr)
+        return 2
+    except NoninteractError as error:
+        print(f"noninteract: {error}", file=sys.stderr)
+        return 1
+    except typer.Exit as end:
+        return end.exit_code
+    except (typer.Abort, KeyboardInterrupt):
+        print("noninteract: interrupted", file=sys.stderr)
+        return 130
+    except Exception as error:
+        return _usage_error(error)
+    return int(code or 0)
+
+
+def _usage_error(error: Exception) -> int:
+    """Shows what click says about a wrong command line; anything else is a bug and passes."""
+    show = getattr(error, "show", None)
+    if show is None:
+        raise error
+    show()
+    return int(getattr(error, "exit_code", 2))
+
+
+@app.command()
+def demo(
+    scenario: Annotated[str, typer.Argument(help="Name or file of a scenario.")] = "paper",
+    duration: Annotated[float | None, typer.Option(help="Simulated time [s].")] = None,
+    rate_factor: Annotated[float, typer.Option(help="Multiplies the control rate.")] = 1.0,
+    out: Annotated[Path | None, typer.Option(help="Output folder.")] = None,
+    in_process: Annotated[bool, typer.Option(help="All nodes in this one process.")] = False,
+) -> int:
+    """Run a scenario on the full stack, record it, check it and draw it."""
+    from noninteract_ros.scenario_file import find_scenario
+
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    source = find_scenario(scenario)
+    folder = out or Path("runs") / f"{source.stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    file = _prepare(source, folder.resolve(), duration, rate_factor)
+    interrupted = _run(file, folder.resolve(), in_process)
+    if interrupted:
+        console.print(f"Interrupted; what was recorded lies in {folder}")
+        return 130
+    return _report(folder, None)
+
+
+def _prepare(source: Path, folder: Path, duration: float | None, rate_factor: float) -> Path:
+    """Writes the scenario as it is run: paused at the start, with an end, at its own rate."""
+    from noninteract_ros.nodes.parameter_files import dump
+    from noninteract_ros.scenario_file import load_scenario, read_parameters
+
+    scenario = load_scenario(source)
+    if duration is not None and not duration > 0.0:
+        raise ScenarioError("--duration", duration, "> 0")
+    if not rate_factor > 0.0:
+        raise ScenarioError("--rate-factor", rate_factor, "> 0")
+    general = scenario.general
+    changes: dict[str, Any] = {
+        "rate": general.rate * rate_factor,
+        "duration": duration or general.duration,
+        "end_time": duration or general.duration,
+        "start_paused": True,
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / "scenario.yaml"
+    file.write_text(dump({"/**": {"ros__parameters": read_parameters(source) | changes}}))
+    load_scenario(file)
+    return file
+
+
+def _run(file: Path, folder: Path, in_process: bool) -> bool:
+    """Runs the stack under a progress bar; returns whether the user ended it."""
+    from noninteract_ros.nodes.demo import run_demo
+    from noninteract_ros.scenario_file import load_scenario
+
+    end = load_scenario(file).general.end_time
+    columns = (
+        TextColumn("{task.description:10}"),
+        BarColumn(),
+        TextColumn("{task.completed:6.2f} of {task.total:.2f} s simulated"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console) as bar:
+        task = bar.add_task("starting", total=end)
+
+        def progress(now: float, state: str) -> None:
+            bar.update(task, completed=min(now, end), description=state)
+
+        try:
+            run_demo(file, folder, in_process, progress)
+        except KeyboardInterrupt:
+            return True
+    return False
+
+
+@app.command()
+def report(
+    run: Annotated[Path, typer.Argument(help="A run: its folder or its run.mcap.")],
+    out: Annotated[Path | None, typer.Option(help="Output folder; by default the run's.")] = None,
+) -> int:
+    """Make metrics and figures again from a recording alone."""
+    return _report(run, out)
+
+
+def _report(run: Path, out: Path | None) -> int:
+    from noninteract_ros.analysis.report import tables, write_report
+
+    with console.status("computing metrics, drawing figures"):
+        made = write_report(run, out)
+    for table in tables(made):
+        console.print(table)
+    console.print("Files:", *(f"\n  {file}" for file in made.files))
+    failed = [check.name for check in made.checks if check.passed is False]
+    if failed:
+        console.print(f"[bold red]Failed:[/] {', '.join(failed)}")
+    return 0 if made.passed else 1
+
+
+@app.command()
+def repair(
+    file: Annotated[Path, typer.Argument(help="A recording that was cut off.")],
+    out: Annotated[Path | None, typer.Option(help="Where to write; by default in place.")] = None,
+) -> int:
+    """Make a recording readable again after its recorder was killed."""
+    from noninteract_ros.analysis.repair import repair as repair_file
+
+    console.print(str(repair_file(file, out)))
+    return 0
+
+
+@app.command()
+def version() -> int:
+    """Print the version."""
+    print(__version__)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

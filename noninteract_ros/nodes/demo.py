@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Runs a scenario on the full stack and leaves its recording behind."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import rclpy
+
+from noninteract_ros.nodes.monitor import Monitor, StackError
+from noninteract_ros.nodes.node import NAMESPACE
+from noninteract_ros.nodes.parameter_files import rewrite
+from noninteract_ros.nodes.stack import InProcess, Processes, Stack, programs_of
+from noninteract_ros.scenario_file import load_scenario
+
+START_TIMEOUT = 60.0  # [s]
+STALL_TIMEOUT = 60.0  # [s] wall time without a step after which a run is given up
+LISTEN = 1.0  # [s] time to find out who else is in the namespace
+
+
+def run_demo(
+    scenario_file: Path, out: Path, in_process: bool, progress: Callable[[float, str], None]
+) -> None:
+    """Starts all programs of a scenario, lets them run to its `end_time`, and ends them.
+
+    Args:
+        scenario_file: A scenario that starts paused and has an `end_time`.
+        out: Output folder, where `run.mcap` and the logs go.
+        in_process: Whether all nodes live in this process.
+        progress: Told the team's time [s] and the state in words, a few times a second.
+
+    Raises:
+        StackError: A program ended, does not answer or does not move.
+        KeyboardInterrupt: The user ended the run; the recording is complete up to then.
+    """
+    scenario = load_scenario(scenario_file)
+    names = programs_of(scenario)
+    with TemporaryDirectory() as folder:
+        arguments = ["--ros-args", "--params-file", str(scenario_file)]
+        rclpy.init(
+            args=rewrite(arguments, Path(folder)) if in_process else None,
+            signal_handler_options=rclpy.SignalHandlerOptions.NO,
+        )
+        stack: Stack | None = None
+        monitor = Monitor(NAMESPACE, lambda: stack.problem() if stack else "")
+        try:
+            if others := monitor.others(LISTEN):
+                raise StackError(
+                    f"/{NAMESPACE} is in use by {', '.join(others)}: end them, or set another"
+                    " ROS_DOMAIN_ID"
+                )
+            progress(0.0, "starting")
+            if in_process:
+                stack = InProcess(names, out, scenario_file)
+            else:
+                stack = Processes(names, scenario_file, out)
+            monitor.wait_until_ready([*names, "recorder"], START_TIMEOUT)
+            monitor.begin(START_TIMEOUT)
+            _follow(monitor, progress)
+        finally:
+            progress(monitor.time(), "ending")
+            if stack is not None:
+                stack.stop()
+            monitor.close()
+            rclpy.try_shutdown()
+
+
+def _follow(monitor: Monitor, progress: Callable[[float, str], None]) -> None:
+    """Until the team is at its end; a run that does not move is given up."""
+    last, moved_at = -1.0, time.monotonic()
+    while not monitor.finished():
+        monitor.spin(0.1)
+        now = monitor.time()
+        progress(now, "running")
+        if now > last:
+            last, moved_at = now, time.monotonic()
+        elif time.monotonic() - moved_at > STALL_TIMEOUT:
+            told = {name: status.text for name, status in monitor.status.items()}
+            raise StackError(f"the team stands still at {now:.3f} s: {told}")
