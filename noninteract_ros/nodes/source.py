@@ -8,6 +8,7 @@ from geometry_msgs.msg import WrenchStamped
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.nodes.cdr import JointStateCodec
