@@ -39,6 +39,8 @@ class PlanarArms:
         M, C, g = np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
         positions = np.array(self.bases)
         J, J_rate = np.zeros((count, 6, n)), np.zeros((count, 6, n))
+        R = np.zeros((count, 3, 3))
+        R[:, 2, 2] = 1.0
         for i, masses in enumerate(self.masses):
             own = slice(2 * i, 2 * i + 2)
             M[own, own], C[own, own], g[own] = self._dynamics(*masses, q[own], v[own])
@@ -49,7 +51,8 @@ class PlanarArms:
             last = -along(ab) * ab_rate
             J_rate[i, :2, own] = LENGTH * np.column_stack([last - along(a) * a_rate, last])
             J[i, 5, own] = 1.0
-        return TeamState(q, v, M, C, g, positions, J, J_rate)
+            R[i, :2, :2] = np.column_stack([along(ab), across(ab)])
+        return TeamState(q, v, M, C, g, positions, J, J_rate, R)
 
     def _dynamics(
         self, m_1: float, m_2: float, q: np.ndarray, v: np.ndarray

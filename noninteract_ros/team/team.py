@@ -25,6 +25,7 @@ class TeamState:
         tool_positions: Tool points in the world, shape (N, 3) [m].
         tool_jacobians: Tool twists (linear, angular) in world axes per v, shape (N, 6, n).
         tool_jacobian_rates: Their time derivatives, shape (N, 6, n).
+        tool_rotations: Tool orientations in the world, shape (N, 3, 3).
     """
 
     q: Array
@@ -35,6 +36,7 @@ class TeamState:
     tool_positions: Array
     tool_jacobians: Array
     tool_jacobian_rates: Array
+    tool_rotations: Array
 
 
 class Team:
@@ -86,15 +88,16 @@ class Team:
         C = pin.computeCoriolisMatrix(model, data, q, v).copy()
         g = pin.computeGeneralizedGravity(model, data, q).copy()
         count = len(self._tools)
-        positions = np.empty((count, 3))
+        positions, rotations = np.empty((count, 3)), np.empty((count, 3, 3))
         jacobians = np.empty((count, 6, self.n))
         rates = np.empty((count, 6, self.n))
         axes = pin.LOCAL_WORLD_ALIGNED
         for i, tool in enumerate(self._tools):
-            positions[i] = pin.updateFramePlacement(model, data, tool).translation
+            placement = pin.updateFramePlacement(model, data, tool)
+            positions[i], rotations[i] = placement.translation, placement.rotation
             jacobians[i] = pin.getFrameJacobian(model, data, tool, axes)
             rates[i] = pin.getFrameJacobianTimeVariation(model, data, tool, axes)
-        return TeamState(q, v, M, C, g, positions, jacobians, rates)
+        return TeamState(q, v, M, C, g, positions, jacobians, rates, rotations)
 
     def inverse_dynamics(self, q: Array, v: Array, acceleration: Array) -> Array:
         """Torque M a + C v + g for a joint acceleration, shape (n,) [N or N m]."""

@@ -154,7 +154,9 @@ def test_inertias_of_section_v():
     M, J_1, J_2 = section_v()
     zero = np.zeros(4)
     none = np.zeros((2, 6, 4))
-    state = TeamState(zero, zero, M, np.zeros((4, 4)), zero, np.zeros((2, 3)), none, none)
+    state = TeamState(
+        zero, zero, M, np.zeros((4, 4)), zero, np.zeros((2, 3)), none, none, none[:, :3, :3]
+    )
     slices = (slice(0, 2), slice(2, 4))
     task = SubtaskState(zero, np.vstack([J_1, J_2]), np.zeros((4, 4)))
     dynamics = task_dynamics(state, task, slices, (None, None))

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rotations: quaternions (x, y, z, w), rotation vectors and their differentials.
+
+Every function takes any leading dimensions, so that all elements are worked off at once, and is
+exact near zero, where series replace the closed forms. Angular velocities are those of a matrix R
+with dR/dt = [omega] R, in the axes that R leads to. For R = exp(phi)
+
+    omega = A(phi) dphi/dt,    A = 1 + a [phi] + b [phi]^2,    A^-1 = 1 - [phi] / 2 + c [phi]^2
+
+with a = (1 - cos t) / t^2, b = (t - sin t) / t^3, c = (1 - (t / 2) cot(t / 2)) / t^2, t = |phi|.
+A phi = A' phi = phi: that is why half the squared angle has the rotation vector as its gradient.
+"""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.special import bernoulli
+
+from noninteract_ros.arrays import Array
+
+
+class _Coefficient:
+    """An even function f of the angle t, exact at any angle below 2 pi.
+
+    Args:
+        series: Coefficients of its power series in t^2.
+        value: f(t) for t >= 1.
+        slope: (df/dt) / t for t >= 1.
+    """
+
+    def __init__(
+        self,
+        series: list[float],
+        value: Callable[[Array], Array],
+        slope: Callable[[Array], Array],
+    ) -> None:
+        self._value, self._slope = value, slope
+        self._series = np.array(series)[::-1]
+        self._slope_series = 2.0 * np.polyder(self._series)
+
+    def value(self, phi: Array) -> Array:
+        """f(|phi|), shape (..., 1, 1)."""
+        return self._at(phi, self._series, self._value)
+
+    def slope(self, phi: Array, phi_rate: Array) -> Array:
+        """df/dt along a motion of phi, shape (..., 1, 1)."""
+        along = (phi * phi_rate).sum(axis=-1)[..., None, None]
+        return along * self._at(phi, self._slope_series, self._slope)
+
+    @staticmethod
+    def _at(phi: Array, series: Array, closed: Callable[[Array], Array]) -> Array:
+        square = (phi * phi).sum(axis=-1)[..., None, None]
+        near = np.polyval(series, np.minimum(square, 1.0))
+        if square.size and square.max() < 1.0:
+            return near
+        return np.where(square < 1.0, near, closed(np.sqrt(np.maximum(square, 1.0))))
+
+
+# Twelve terms leave less than rounding where t < 1.
+_TERMS = range(12)
+_BERNOULLI = bernoulli(2 * len(_TERMS))
+_A = _Coefficient(
+    [(-1) ** k / math.factorial(2 * k + 2) for k in _TERMS],
+    lambda t: (1.0 - np.cos(t)) / t**2,
+    lambda t: (t * np.sin(t) + 2.0 * np.cos(t) - 2.0) / t**4,
+)
+_B = _Coefficient(
+    [(-1) ** k / math.factorial(2 * k + 3) for k in _TERMS],
+    lambda t: (t - np.sin(t)) / t**3,
+    lambda t: (3.0 * np.sin(t) - t * np.cos(t) - 2.0 * t) / t**5,
+)
+_C = _Coefficient(
+    [abs(_BERNOULLI[2 * k + 2]) / math.factorial(2 * k + 2) for k in _TERMS],
+    lambda t: (1.0 - 0.5 * t / np.tan(0.5 * t)) / t**2,
+    lambda t: (0.5 * t / np.tan(0.5 * t) + 0.25 * (t / np.sin(0.5 * t)) ** 2 - 2.0) / t**4,
+)
+
+_GENERATORS: Array = np.zeros((3, 3, 3))  # hat(w)[j, k] = sum over i of w[i] G[i, j, k]
+for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+    _GENERATORS[_i, _k, _j], _GENERATORS[_i, _j, _k] = 1.0, -1.0
+_GENERATORS = _GENERATORS.reshape(3, 9)
+_IDENTITY = np.eye(3)
+
+
+def hat(w: Array) -> Array:
+    """Matrix [w] with [w] u = w x u, shape (..., 3, 3)."""
+    return (w @ _GENERATORS).reshape(*w.shape, 3)
+
+
+def exp(phi: Array) -> Array:
+    """Unit quaternion of a rotation vector [rad], shape (..., 4)."""
+    angle = np.sqrt((phi * phi).sum(axis=-1, keepdims=True))
+    return np.concatenate([0.5 * np.sinc(angle / (2.0 * np.pi)) * phi, np.cos(0.5 * angle)], -1)
+
+
+def log(q: Array) -> Array:
+    """Shortest rotation vector of a quaternion of either sign [rad], shape (..., 3).
+
+    Its length is at most pi, which is where it jumps to the other side.
+    """
+    vector, scalar = q[..., :3], q[..., 3:]
+    size = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
+    angle = 2.0 * np.arctan2(size, np.abs(scalar))
+    positive = size > 0.0
+    scale = np.where(positive, angle, 2.0) / np.where(positive, size, 1.0)
+    return np.where(scalar < 0.0, -scale, scale) * vector
+
+
+def product(p: Array, q: Array) -> Array:
+    """Quaternion of the rotation q followed by p, shape (..., 4)."""
+    px, py, pz, pw = np.moveaxis(p, -1, 0)
+    qx, qy, qz, qw = np.moveaxis(q, -1, 0)
+    parts = (
+        pw * qx + px * qw + py * qz - pz * qy,
+        pw * qy - px * qz + py * qw + pz * qx,
+        pw * qz + px * qy - py * qx + pz * qw,
+        pw * qw - px * qx - py * qy - pz * qz,
+    )
+    return np.stack(parts, axis=-1)
+
+
+def inverse(q: Array) -> Array:
+    """Quaternion of the opposite rotation, for a unit one, shape (..., 4)."""
+    return q * np.array([-1.0, -1.0, -1.0, 1.0])
+
+
+def normalized(q: Array) -> Array:
+    """The quaternion at unit length, shape (..., 4)."""
+    return q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
+
+
+def matrix(q: Array) -> Array:
+    """Rotation matrix of a unit quaternion, shape (..., 3, 3)."""
+    cross = hat(q[..., :3])
+    return _IDENTITY + 2.0 * (q[..., 3, None, None] * cross + cross @ cross)
+
+
+def quaternion(R: Array) -> Array:
+    """Unit quaternion of a rotation matrix with w >= 0, shape (..., 4).
+
+    Each row of 4 q q' is the quaternion times one of its components; the longest row is taken.
+    """
+    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
+    both, turn = R + np.swapaxes(R, -1, -2), R - np.swapaxes(R, -1, -2)
+    xy, xz, yz = both[..., 0, 1], both[..., 0, 2], both[..., 1, 2]
+    x, y, z = turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]
+    rows = (
+        (1.0 + xx - yy - zz, xy, xz, x),
+        (xy, 1.0 - xx + yy - zz, yz, y),
+        (xz, yz, 1.0 - xx - yy + zz, z),
+        (x, y, z, 1.0 + xx + yy + zz),
+    )
+    table = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    longest = np.einsum("...ii->...i", table).argmax(axis=-1)[..., None, None]
+    q = normalized(np.take_along_axis(table, longest, axis=-2)[..., 0, :])
+    return np.where(q[..., 3:] < 0.0, -q, q)
+
+
+def jacobian(phi: Array) -> Array:
+    """A(phi), shape (..., 3, 3): angular velocity of exp(phi) per rate of phi."""
+    cross = hat(phi)
+    return _IDENTITY + _A.value(phi) * cross + _B.value(phi) * (cross @ cross)
+
+
+def jacobian_rate(phi: Array, phi_rate: Array) -> Array:
+    """dA/dt along a motion of phi, shape (..., 3, 3)."""
+    cross, cross_rate = hat(phi), hat(phi_rate)
+    linear = _A.slope(phi, phi_rate) * cross + _A.value(phi) * cross_rate
+    return linear + _squared_rate(_B, phi, phi_rate, cross, cross_rate)
+
+
+def inverse_jacobian(phi: Array) -> Array:
+    """A(phi)^-1, shape (..., 3, 3); it is bounded up to |phi| = pi and singular at 2 pi."""
+    cross = hat(phi)
+    return _IDENTITY - 0.5 * cross + _C.value(phi) * (cross @ cross)
+
+
+def inverse_jacobian_rate(phi: Array, phi_rate: Array) -> Array:
+    """d(A^-1)/dt along a motion of phi, shape (..., 3, 3)."""
+    cross, cross_rate = hat(phi), hat(phi_rate)
+    return _squared_rate(_C, phi, phi_rate, cross, cross_rate) - 0.5 * cross_rate
+
+
+def _squared_rate(
+    factor: _Coefficient, phi: Array, phi_rate: Array, cross: Array, cross_rate: Array
+) -> Array:
+    """Rate of f [phi]^2."""
+    mixed = cross_rate @ cross
+    square_rate = mixed + np.swapaxes(mixed, -1, -2)
+    return factor.slope(phi, phi_rate) * (cross @ cross) + factor.value(phi) * square_rate
