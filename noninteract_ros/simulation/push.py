@@ -10,6 +10,8 @@ from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import key
 from noninteract_ros.team.team import Team
 
+RESOLUTION = 1e-9  # [s] what lies less apart is the same instant
+
 
 @dataclass(frozen=True)
 class ScheduledPush:
@@ -22,7 +24,7 @@ class ScheduledPush:
 
     def wrench(self, now: float) -> Array:
         """Wrench on the tool at a time, shape (6,) [N, N m]."""
-        acts = self.start <= now < self.start + self.duration
+        acts = -RESOLUTION < now - self.start < self.duration - RESOLUTION
         return np.array([*self.force, 0.0, 0.0, 0.0]) if acts else np.zeros(6)
 
     def check(self, name: str, team: Team) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
 from noninteract_ros.simulation.integrator import runge_kutta_step
-from noninteract_ros.simulation.push import LivePush, ScheduledPush
+from noninteract_ros.simulation.push import RESOLUTION, LivePush, ScheduledPush
 from noninteract_ros.simulation.subtask_object import SubtaskObject
 from noninteract_ros.team.team import Team
 
@@ -65,7 +65,7 @@ class TeamSimulation:
             in_tool_axes: Whether the wrench is given in tool axes instead of world axes.
             duration: Time after which it lapses [s].
         """
-        self._live[robot] = LivePush(wrench, in_tool_axes, self.now + duration)
+        self._live[robot] = LivePush(wrench, in_tool_axes, self.now + duration - RESOLUTION)
 
     def step(self, torque: Array | None) -> None:
         """One tick under a control torque, shape (n,); None brakes by damping and gravity."""
