@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The inputs of one source, by stamp."""
+
+import numpy as np
+import pytest
+
+from noninteract_ros.control.inputs import HORIZON, Force, Rate, Source
+from noninteract_ros.errors import InputError
+
+
+def rate(value: float) -> Rate:
+    return Rate(np.array([value]))
+
+
+def test_inputs_hold_from_their_stamps_on():
+    """An input is in force from its stamp until the next one's, whenever it came."""
+    source = Source()
+    assert source.motion(10.0) is None
+    for stamp in (1.0, 2.0, 2.5):
+        source.receive(stamp, rate(stamp), now=2.0)
+    assert source.motion(0.999) is None
+    assert source.motion(1.0)[1].velocity == 1.0
+    assert source.motion(1.9)[0] == 1.0
+    assert source.motion(7.0)[0] == 2.5
+    assert source.motion(8.0)[0] == 2.5
+
+
+def test_of_one_stamp_the_last_counts():
+    """Two inputs of one stamp are both taken; the later one is in force."""
+    source = Source()
+    source.receive(1.0, rate(1.0), now=1.0)
+    source.receive(1.0, rate(2.0), now=1.0)
+    assert source.motion(1.0)[1].velocity == 2.0
+
+
+@pytest.mark.parametrize("asked_for", [False, True])
+def test_a_stamp_that_goes_back_is_refused(asked_for):
+    """An input older than the last one is refused, whether that waits or is in force."""
+    source = Source()
+    source.receive(1.5, rate(1.0), now=1.0)
+    if asked_for:
+        source.motion(1.5)
+    with pytest.raises(InputError, match=r"goes back: 1\.400000 s after 1\.500000 s"):
+        source.receive(1.4, rate(2.0), now=1.0)
+    assert source.motion(1.5)[1].velocity == 1.0
+
+
+def test_a_stamp_far_ahead_is_refused():
+    """An input for later than the horizon is refused and does not block what comes after."""
+    source = Source()
+    with pytest.raises(InputError, match="ahead of the team's time"):
+        source.receive(2.0 + HORIZON, rate(1.0), now=1.0)
+    source.receive(1.2, rate(2.0), now=1.0)
+    assert source.motion(1.2)[1].velocity == 2.0
+
+
+def test_forces_and_motions_do_not_displace_each_other():
+    """A force input leaves the motion in force, and has an order of stamps of its own."""
+    source = Source()
+    source.receive(1.0, rate(1.0), now=1.0)
+    source.receive(0.5, Force(np.array([3.0])), now=1.0)
+    assert source.motion(1.0)[0] == 1.0
+    assert source.force(1.0)[1].force == 3.0
+
+
+def test_markers_and_motions_say_how_far_the_source_has_spoken():
+    """`heard_until` is the latest stamp of a motion or marker; it never goes back."""
+    source = Source()
+    assert source.heard_until == -np.inf
+    source.receive(1.0, rate(1.0), now=1.0)
+    source.silent_until(3.0)
+    source.silent_until(2.0)
+    source.receive(1.5, rate(1.0), now=1.0)
+    assert source.heard_until == 3.0
+
+
+def test_forget_drops_what_came_but_not_how_far_it_was_spoken():
+    """After `forget` nothing is in force and any stamp is welcome."""
+    source = Source()
+    source.receive(1.0, rate(1.0), now=1.0)
+    source.receive(1.0, Force(np.array([3.0])), now=1.0)
+    source.motion(1.0)
+    source.forget()
+    assert source.motion(9.0) is None
+    assert source.force(9.0) is None
+    assert source.heard_until == 1.0
+    source.receive(0.5, rate(2.0), now=1.0)
+    assert source.motion(1.0)[1].velocity == 2.0

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The integration method on motions whose solution is known."""
+
+import numpy as np
+import pytest
+
+from noninteract_ros.simulation.integrator import runge_kutta_step
+
+
+def swing(steps: int) -> float:
+    """Error of the state of an oscillator after one second in a number of steps."""
+    q, v = np.array([1.0]), np.array([0.0])
+    for _ in range(steps):
+        q, v = runge_kutta_step(np.add, lambda q, v: -9.0 * q, q, v, 1.0 / steps)
+    return float(np.hypot(q[0] - np.cos(3.0), (v[0] + 3.0 * np.sin(3.0)) / 3.0))
+
+
+def test_error_falls_with_the_fourth_power_of_the_step():
+    """Halving the step divides the error by 16."""
+    assert swing(20) / swing(40) == pytest.approx(16.0, rel=0.1)
+
+
+def test_constant_acceleration_is_exact():
+    """A fall is exact in one step."""
+    fall = np.array([-9.81])
+    q, v = runge_kutta_step(np.add, lambda q, v: fall, np.array([1.0]), np.array([2.0]), 0.5)
+    np.testing.assert_allclose([q[0], v[0]], [1.0 + 1.0 - 0.5 * 9.81 * 0.25, 2.0 - 9.81 * 0.5])
