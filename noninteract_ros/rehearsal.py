@@ -77,7 +77,10 @@ class Rehearsal:
             for stamp, reference in narrator.speak(now, feedback):
                 if reference is not None:
                     heard.receive(stamp / 1e9, reference, now)
-        tick = self.controller.step(now, self.simulation.q, self.simulation.v)
+        # As the joint states carry it: an angle of a continuous joint, not its sine and cosine.
+        positions = self.team.joints_from_configuration(self.simulation.q)
+        q = self.team.configuration_from_joints(positions)
+        tick = self.controller.step(now, q, self.simulation.v)
         if self._felt:
             part = self.stack.slices[self.stack.names.index(self._felt)]
             self._feedback = tick.feedback[part]

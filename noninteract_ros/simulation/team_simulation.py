@@ -16,8 +16,8 @@ from noninteract_ros.team.team import Team
 class TeamSimulation:
     """The team, what it holds and who pushes it.
 
-    The torque is held over a tick, external torques follow the state inside it; the method is
-    the classical Runge-Kutta one, order 4.
+    The torque is held over a tick, external torques and the joints' friction follow the state
+    inside it; the method is the classical Runge-Kutta one, order 4.
 
     Args:
         team: The robots.
@@ -79,7 +79,7 @@ class TeamSimulation:
 
         def acceleration(q: Array, v: Array) -> Array:
             if still:
-                return self.team.forward_dynamics(q, v, applied(q, v))
+                return self.team.forward_dynamics(q, v, self._rubbed(v, applied(q, v)))
             return self._loaded_acceleration(q, v, applied(q, v))
 
         self.torque = applied(self.q, self.v)
@@ -87,6 +87,10 @@ class TeamSimulation:
         self.q, self.v = runge_kutta_step(integrate, acceleration, self.q, self.v, 1 / self.rate)
         self.tick += 1
         self._live = {name: push for name, push in self._live.items() if push.until > self.now}
+
+    def _rubbed(self, v: Array, torque: Array) -> Array:
+        """What viscous friction leaves of a torque, shape (n,) [N or N m]."""
+        return torque - self.team.friction * v
 
     def _push_wrenches(self, q: Array) -> Array:
         """Pushes on each tool of a team at q now, world axes, shape (N, 6) [N, N m]."""
@@ -105,7 +109,8 @@ class TeamSimulation:
         """Acceleration with everything that acts from outside; the object's mass is implicit."""
         pushes = self._push_wrenches(q)
         state = self.team.state(q, v)
-        total = torque + self.team.external_torque(state, pushes) - state.C @ v - state.g
+        load = self._rubbed(v, torque) - state.C @ v - state.g
+        total = load + self.team.external_torque(state, pushes)
         if self._held is None:
             return np.linalg.solve(state.M, total)
         A, b = self._held.torque_terms(state)

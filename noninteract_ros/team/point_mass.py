@@ -7,14 +7,15 @@ import numpy as np
 import pinocchio as pin
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.schema import key
-from noninteract_ros.team.robot import AXES, Robot
+from noninteract_ros.schema import join, key
+from noninteract_ros.team.joint_settings import JointSettings, configuration_within
+from noninteract_ros.team.robot import AXES, Robot, position_limits
 
 PRISMATIC = {"x": pin.JointModelPX, "y": pin.JointModelPY, "z": pin.JointModelPZ}
 
 
 @dataclass(frozen=True)
-class PointMass:
+class PointMass(JointSettings):
     """Configuration block of a point mass; coordinates are world positions along `axes`."""
 
     mass: float = key("Mass [kg]", positive=True)
@@ -29,15 +30,11 @@ class PointMass:
         """The robot as a Pinocchio model: one prismatic joint per axis, the mass on the last.
 
         Raises:
-            ScenarioError: Axes repeat or the initial position has another length.
+            ScenarioError: Axes repeat, or another key does not fit them.
         """
         if not self.axes or len(set(self.axes)) != len(self.axes):
             allowed = "one to three different ones of x, y, z"
             raise ScenarioError(f"{name}.axes", list(self.axes), allowed)
-        initial = self.initial_position or (0.0,) * len(self.axes)
-        if len(initial) != len(self.axes):
-            allowed = f"{len(self.axes)} numbers, one per axis {list(self.axes)}"
-            raise ScenarioError(f"{name}.initial_position", list(initial), allowed)
         model = pin.Model()
         model.name = name
         parent = 0
@@ -46,4 +43,8 @@ class PointMass:
         body = pin.Inertia(self.mass, np.zeros(3), np.zeros((3, 3)))
         model.appendBodyToJoint(parent, body, pin.SE3.Identity())
         model.addFrame(pin.Frame("tool", parent, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-        return Robot(name, model, "tool", np.array(initial), self.axes, self.brake_damping)
+        self.equip(name, model)
+        path = join(name, "initial_position")
+        limits = position_limits(model)
+        start = configuration_within(path, self.initial_position, model, limits)
+        return Robot(name, model, "tool", start, self.axes, self.brake_damping)

@@ -3,8 +3,10 @@
 
 from typing import Protocol
 
+from noninteract_ros.team.planar_arm import PlanarArm
 from noninteract_ros.team.point_mass import PointMass
 from noninteract_ros.team.robot import Robot
+from noninteract_ros.team.urdf import UrdfRobot
 
 
 class RobotBlock(Protocol):
@@ -14,4 +16,8 @@ class RobotBlock(Protocol):
         """The robot."""
 
 
-ROBOT_MODELS: dict[str, type[RobotBlock]] = {"point_mass": PointMass}
+ROBOT_MODELS: dict[str, type[RobotBlock]] = {
+    "point_mass": PointMass,
+    "planar_arm": PlanarArm,
+    "urdf": UrdfRobot,
+}

@@ -9,7 +9,9 @@ import pinocchio as pin
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import TeamError
-from noninteract_ros.team.robot import Robot
+from noninteract_ros.team.joining import append_model
+from noninteract_ros.team.joint_coordinates import JointCoordinates
+from noninteract_ros.team.robot import Robot, frame_index
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,8 +48,18 @@ class Team:
         robots: At least two robots with different names.
         gravity: Gravitational acceleration in the world, shape (3,) [m/s^2].
 
+    Attributes:
+        n: Number of velocities, which is that of the joints.
+        q0: Initial configuration, shape (nq,).
+        effort_limits: Largest torque of each joint, shape (n,) [N or N m]; inf where none.
+        velocity_limits: Largest speed of each joint, shape (n,) [m/s or rad/s]; inf where none.
+        position_limits: Lowest and highest joint positions, shape (2, n) [m or rad].
+        friction: Viscous friction of the joints, shape (n,) [N s/m or N m s/rad]; M, C and g do
+            not have it.
+        brake_damping: Damping of the robots' own brakes, shape (n,) [N s/m or N m s/rad].
+
     Raises:
-        TeamError: Fewer than two robots, or a name twice.
+        TeamError: Fewer than two robots, a name twice, or a tool frame that is not there.
     """
 
     def __init__(
@@ -69,14 +81,37 @@ class Team:
         self.brake_damping = np.concatenate(
             [np.full(robot.model.nv, robot.brake_damping) for robot in robots]
         )
+        self.effort_limits = np.concatenate([robot.effort_limits for robot in robots])
+        self.velocity_limits = np.concatenate([robot.velocity_limits for robot in robots])
+        self.position_limits = np.hstack([robot.position_limits for robot in robots])
+        self.friction = np.concatenate([robot.model.damping for robot in robots])
+        self._coordinates = JointCoordinates(self.model)
         self._data = self.model.createData()
-        self._tools = [self.model.getFrameId(f"{r.name}/{r.tool_frame}") for r in robots]
+        self._tools = [self._tool(robot) for robot in robots]
         self._lower = np.tri(self.n, k=-1, dtype=bool)
 
     @staticmethod
     def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
         ends = np.cumsum(sizes).tolist()
         return tuple(slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
+
+    def _tool(self, robot: Robot) -> int:
+        index = frame_index(self.model, f"{robot.name}/{robot.tool_frame}")
+        if index is None:
+            raise TeamError(f"{robot.name} has no frame {robot.tool_frame!r}")
+        return index
+
+    def configuration_from_joints(self, positions: Array) -> Array:
+        """Configuration, shape (nq,), of one position per joint, shape (n,), any angle."""
+        return self._coordinates.configuration(positions)
+
+    def joints_from_configuration(self, q: Array) -> Array:
+        """One position per joint, shape (n,); of continuous joints within (-pi, pi]."""
+        return self._coordinates.positions(q)
+
+    def difference(self, start: Array, end: Array) -> Array:
+        """Tangent vector from one configuration to another, shape (n,), the shortest way."""
+        return self._coordinates.difference(start, end)
 
     def state(self, q: Array, v: Array) -> TeamState:
         """Dynamics and tool kinematics at (q, v); the arrays are new at each call."""
@@ -153,7 +188,7 @@ class Team:
 
 
 def _join(robots: Sequence[Robot]) -> pin.Model:
-    """One model: every joint and frame is prefixed with its robot's name."""
+    """One model, each robot at its base; joints and frames are prefixed with its name."""
     team = pin.Model()
     team.name = "team"
     for robot in robots:
@@ -163,5 +198,5 @@ def _join(robots: Sequence[Robot]) -> pin.Model:
         for index in range(1, part.nframes):
             frame = part.frames[index]
             frame.name = f"{robot.name}/{frame.name}"
-        team = pin.appendModel(team, part, 0, pin.SE3.Identity())
+        team = append_model(team, part, robot.base_pose)
     return team

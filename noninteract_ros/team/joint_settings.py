@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What joints can do and what resists them: limits, friction, armature."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.errors import ScenarioError
+from noninteract_ros.schema import join, key
+from noninteract_ros.team.joint_coordinates import JointCoordinates
+
+ROUNDING = 1e-9  # [m or rad] by which a position may pass a limit.
+
+
+@dataclass(frozen=True, kw_only=True)
+class JointSettings:
+    """Keys that every robot has for its joints: one number for all, or one per joint.
+
+    Friction acts in the simulation alone. The controller does not know it, as it does not know
+    that of a real joint: to the law it is an external torque, and a passive one.
+    """
+
+    effort_limit: tuple[float, ...] = key(
+        "Largest torque [N or N m]; by default the model's own, or none", (), positive=True
+    )
+    velocity_limit: tuple[float, ...] = key(
+        "Largest speed [m/s or rad/s]; by default the model's own, or none", (), positive=True
+    )
+    lower_limit: tuple[float, ...] = key(
+        "Lowest position [m or rad]; by default the model's own, or none", ()
+    )
+    upper_limit: tuple[float, ...] = key(
+        "Highest position [m or rad]; by default the model's own, or none", ()
+    )
+    friction: tuple[float, ...] = key(
+        "Viscous friction of the simulated joints [N s/m or N m s/rad]; by default none",
+        (),
+        minimum=0.0,
+    )
+    armature: tuple[float, ...] = key(
+        "Inertia of the rotor, seen at the joint [kg or kg m^2]; by default none", (), minimum=0.0
+    )
+
+    def equip(self, name: str, model: pin.Model) -> None:
+        """Puts what is given into a robot's model.
+
+        Raises:
+            ScenarioError: A list has another length, a limit does not fit, or a joint moves no
+                mass.
+        """
+        nothing = np.zeros(model.nv)
+        model.damping = self._spread(name, model, "friction", nothing)
+        model.armature = self._spread(name, model, "armature", nothing)
+        model.upperEffortLimit = self._spread(name, model, "effort_limit", model.upperEffortLimit)
+        model.lowerEffortLimit = -model.upperEffortLimit
+        model.velocityLimit = self._spread(name, model, "velocity_limit", model.velocityLimit)
+        self._limit_positions(name, model)
+
+    def _spread(self, name: str, model: pin.Model, entry: str, default: Array) -> Array:
+        given = getattr(self, entry)
+        return per_joint(join(name, entry), given, joint_names(model)) if given else default
+
+    def _limit_positions(self, name: str, model: pin.Model) -> None:
+        for entry in ("lower_limit", "upper_limit"):
+            if not getattr(self, entry):
+                continue
+            limits = self._spread(name, model, entry, np.zeros(0))
+            if model.nq != model.nv:
+                allowed = "nothing: this robot has continuous joints, which have no limits"
+                raise ScenarioError(join(name, entry), list(getattr(self, entry)), allowed)
+            if entry == "lower_limit":
+                model.lowerPositionLimit = limits
+            else:
+                model.upperPositionLimit = limits
+        crossed = model.lowerPositionLimit > model.upperPositionLimit
+        if crossed.any():
+            joint = int(crossed.argmax())
+            found = f"{model.upperPositionLimit[joint]:g} for {joint_names(model)[joint]}"
+            allowed = f">= {model.lowerPositionLimit[joint]:g}, its lower limit"
+            raise ScenarioError(join(name, "upper_limit"), found, allowed)
+
+
+def joint_names(model: pin.Model) -> list[str]:
+    """Names of the joints that move."""
+    return list(model.names)[1:]
+
+
+def per_joint(key: str, values: Sequence[float], joints: Sequence[str]) -> Array:
+    """Numbers for each joint, from one for all or one per joint.
+
+    Raises:
+        ScenarioError: Any other count.
+    """
+    if len(values) not in (1, len(joints)):
+        allowed = f"1 number, or {len(joints)}: one per joint {list(joints)}"
+        raise ScenarioError(key, list(values), allowed)
+    return np.full(len(joints), values[0]) if len(values) == 1 else np.array(values)
+
+
+def configuration_within(
+    key: str, values: Sequence[float], model: pin.Model, limits: Array
+) -> Array:
+    """Configuration of joint positions that respect limits, shape (nq,); by default zeros.
+
+    Args:
+        key: Full key, for errors.
+        values: Position of each joint [m or rad].
+        model: The robot.
+        limits: Lowest and highest positions, shape (2, nv).
+
+    Raises:
+        ScenarioError: The count is wrong, or a joint is beyond its limits.
+    """
+    joints = joint_names(model)
+    if values and len(values) != len(joints):
+        allowed = f"{len(joints)} numbers, one per joint {joints}"
+        raise ScenarioError(key, list(values), allowed)
+    positions = np.array(values) if values else np.zeros(len(joints))
+    beyond = (positions < limits[0] - ROUNDING) | (positions > limits[1] + ROUNDING)
+    if beyond.any():
+        joint = int(beyond.argmax())
+        low, high = limits[:, joint]
+        found = f"{positions[joint]:g} for {joints[joint]}{'' if values else ' by default'}"
+        raise ScenarioError(key, found, f">= {low:g} and <= {high:g}, the joint's limits")
+    return JointCoordinates(model).configuration(positions)
