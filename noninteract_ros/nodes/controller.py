@@ -141,9 +141,10 @@ class Controller(ScenarioNode):
             self.refuse(topic, str(error))
 
     def _on_state(self, data: bytes) -> None:
-        stamp, q, v, _ = self._joints.decode(data)
-        assert q is not None  # The codec requires both.
+        stamp, positions, v, _ = self._joints.decode(data)
+        assert positions is not None  # The codec requires both.
         assert v is not None
+        q = self.core.team.configuration_from_joints(positions)
         if self._order.check("joint_states", stamp):
             self._answered = None
             self._post(self.core.reset)

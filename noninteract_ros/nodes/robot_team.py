@@ -111,8 +111,9 @@ class RobotTeam(ScenarioNode):
                 self._wrenches, simulation.external_wrenches(), strict=True
             ):
                 publisher.publish(messages.to_wrench_stamped(self._stamp, wrench))
+        positions = self._team.joints_from_configuration(simulation.q)
         self._publish_to.publish(
-            self._states.encode(self._stamp, simulation.q, simulation.v, simulation.torque)
+            self._states.encode(self._stamp, positions, simulation.v, simulation.torque)
         )
 
     def _resend(self) -> None:
