@@ -24,7 +24,8 @@ from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.controller_parameters import LiveParameters
 from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder
 from noninteract_ros.nodes.messages import Level, Marker, ParsedReference, SubtaskCodec
-from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker, run_program
+from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker
+from noninteract_ros.nodes.program import run_program
 from noninteract_ros.nodes.telemetry import Telemetry
 
 WATCH_PERIOD = 0.1  # [s] how often absent lockstep sources are looked for

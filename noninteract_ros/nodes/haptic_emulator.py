@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-from noninteract_ros.nodes.node import run_program
+from noninteract_ros.nodes.program import run_program
 from noninteract_ros.nodes.source import SourceNode
 
 

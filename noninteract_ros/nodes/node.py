@@ -1,30 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every program shares: the scenario as parameters, diagnostics, refusals, start and end."""
+"""What every program shares: the scenario as parameters, diagnostics, refusals, its threads."""
 
-import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from collections.abc import Callable
 from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import ParameterDescriptor
 from rclpy.clock import Clock, ClockType
-from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
 from rclpy.task import Future
-from rclpy.utilities import remove_ros_args
 
-from noninteract_ros.errors import InputError, ScenarioError
+from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.messages import Level, to_diagnostics, to_status
-from noninteract_ros.nodes.parameter_files import file_of_key, files_of, rewrite
+from noninteract_ros.nodes.program import until_shutdown
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario_file import nest
 
@@ -33,6 +28,7 @@ LOOP_QOS = QoSProfile(depth=16)  # reliable; deep enough that a busy reader miss
 DIAGNOSTICS_PERIOD = 0.5
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 LOG_PERIOD = 2.0
+JOIN_TIMEOUT = 1.0  # [s] given to a callback that runs when the program ends
 EMPTY_TYPES = {
     tuple[float, ...]: Parameter.Type.DOUBLE_ARRAY,
     tuple[str, ...]: Parameter.Type.STRING_ARRAY,
@@ -91,10 +87,10 @@ class ScenarioNode(Node):
         level, text, values = self.status()
         matched = [(item.topic_name, item.get_subscription_count()) for item in self.publishers]
         values["subscribers"] = ", ".join(f"{topic} {count}" for topic, count in matched)
-        if self._refused:
-            values["refused inputs"] = sum(self._refused.values())
+        if refused := dict(self._refused):  # The loop may refuse something meanwhile.
+            values["refused inputs"] = sum(refused.values())
             values["last refusal"] = self._last_refusal
-            values |= {f"refused on {topic}": count for topic, count in self._refused.items()}
+            values |= {f"refused on {topic}": count for topic, count in refused.items()}
         status = to_status(self.get_fully_qualified_name(), level, text, values)
         now = self.get_clock().now().nanoseconds
         self._diagnostics.publish(to_diagnostics(now, [status]))
@@ -127,10 +123,30 @@ class ScenarioNode(Node):
         executor.add_node(self)
         if self.lockstep:
             spin(executor, self.context)
-            return
-        thread = threading.Thread(target=spin, args=(executor, self.context), daemon=True)
+        else:
+            self._run_loop(executor)
+
+    def _run_loop(self, executor: EventsExecutor) -> None:
+        """The loop here and the callbacks beside it; where one of them fails, both end."""
+        failures: list[Exception] = []
+
+        def serve() -> None:
+            try:
+                spin(executor, self.context)
+            except Exception as error:
+                failures.append(error)
+                self.context.try_shutdown()
+
+        thread = threading.Thread(target=serve, daemon=True)
         thread.start()
-        self.loop()
+        try:
+            with until_shutdown(self.context):
+                self.loop()
+        finally:
+            self.context.try_shutdown()
+            thread.join(JOIN_TIMEOUT)
+        if failures:
+            raise failures[0]
 
 
 def _plain(value: Any) -> Any:
@@ -142,11 +158,9 @@ def spin(executor: EventsExecutor, context: rclpy.Context) -> None:
 
     `EventsExecutor.spin` without a time-out busy-loops in the PyPI wheels; this form does not.
     """
-    try:
+    with until_shutdown(context):
         while context.ok():
             executor.spin_until_future_complete(Future(), 3600.0)
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
 
 
 class Ticker:
@@ -167,35 +181,3 @@ class Ticker:
             skipped = int((now - self._next) / self._period)
             self.missed += skipped
             self._next += skipped * self._period
-
-
-def run_program(make: Callable[[], ScenarioNode], arguments: Sequence[str] | None) -> int:
-    """Main function of a program: exit status 2 and one line where its parameters are wrong."""
-    argv = list(sys.argv if arguments is None else arguments)
-    files = files_of(argv)
-    try:
-        with TemporaryDirectory() as folder:
-            ros_arguments = rewrite(argv, Path(folder))
-            _refuse_plain_arguments(ros_arguments)
-            rclpy.init(args=ros_arguments)
-            node = make()
-    except ScenarioError as error:
-        named = error.file or file_of_key(files, error.key)
-        print(ScenarioError(error.key, error.found, error.allowed, named), file=sys.stderr)
-        rclpy.try_shutdown()
-        return 2
-    sys.setswitchinterval(0.0005)  # The loop must not wait for the executor's thread for long.
-    try:
-        node.run()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        node.destroy_node()
-        rclpy.try_shutdown()
-    return 0
-
-
-def _refuse_plain_arguments(arguments: list[str]) -> None:
-    plain = remove_ros_args(arguments)[1:]
-    if plain:
-        raise ScenarioError("(arguments)", " ".join(plain), "--ros-args ...")

@@ -16,6 +16,8 @@ from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario_file import read_yaml
 
 OPTION = "--params-file"
+OVERRIDES = ("-p", "--param")
+COMMAND_LINE = "-p"
 
 
 class _Quoted(yaml.SafeDumper):
@@ -33,15 +35,15 @@ def files_of(arguments: Sequence[str]) -> list[str]:
 
 
 def rewrite(arguments: Sequence[str], folder: Path) -> list[str]:
-    """The same command line with parameter files that ROS reads as they are meant.
+    """The same command line with parameters that ROS reads as they are meant.
 
     Args:
         arguments: A ROS command line.
         folder: Where the rewritten files are put.
 
     Raises:
-        ScenarioError: A file is missing, is no YAML, is no parameter file, or holds a list of
-            unlike items; the error names the file and the key.
+        ScenarioError: A file is missing, is no YAML, is no parameter file, or a list has unlike
+            items; the error names the file and the key.
     """
     result = list(arguments)
     for place in range(1, len(result)):
@@ -49,7 +51,23 @@ def rewrite(arguments: Sequence[str], folder: Path) -> list[str]:
             content = _checked(result[place])
             result[place] = str(folder / f"{place}.yaml")
             Path(result[place]).write_text(dump(content))
+        elif result[place - 1] in OVERRIDES:
+            result[place] = _rewrite_override(result[place])
     return result
+
+
+def _rewrite_override(text: str) -> str:
+    """`key:=value` with a list that ROS reads as it is meant."""
+    key, separator, written = text.partition(":=")
+    try:
+        value = yaml.safe_load(written)
+    except yaml.YAMLError:
+        return text  # ROS says what is wrong with it.
+    if not isinstance(value, list):
+        return text
+    _check_leaf(key, value, COMMAND_LINE)
+    dumped = yaml.dump(_plain(value), Dumper=_Quoted, default_flow_style=True, width=10**6)
+    return key + separator + dumped.strip()
 
 
 def dump(content: Mapping[str, Any]) -> str:
@@ -57,9 +75,15 @@ def dump(content: Mapping[str, Any]) -> str:
     return yaml.dump(_plain(content), Dumper=_Quoted, sort_keys=False)
 
 
-def file_of_key(paths: Sequence[str], key: str) -> str | None:
-    """The last of the files that holds a key's block; the last file where none does."""
-    head = key.split(".")[0]
+def origin_of_key(arguments: Sequence[str], key: str) -> str | None:
+    """What gives a key on a command line: an override, the last file that holds its block.
+
+    The last file, where none does; None, where there is no file.
+    """
+    for option, text in pairwise(arguments):
+        if option in OVERRIDES and text.partition(":=")[0].rpartition(":")[2] == key:
+            return COMMAND_LINE
+    paths, head = files_of(arguments), key.split(".")[0]
     for path in reversed(paths):
         if any(item.split(".")[0] == head for item, _ in _leaves(_checked(path))):
             return path
@@ -69,13 +93,24 @@ def file_of_key(paths: Sequence[str], key: str) -> str | None:
 def _checked(path: str) -> Mapping[str, Any]:
     content = read_yaml(Path(path))
     if not isinstance(content, Mapping):
-        raise ScenarioError("(file)", type(content).__name__, "node: ros__parameters: ...", path)
+        found = "nothing" if content is None else repr(content)
+        raise ScenarioError("(file)", found, "node: ros__parameters: ...", path)
     for node, block in content.items():
-        if not isinstance(block, Mapping):
-            raise ScenarioError(str(node), repr(block), "a block with ros__parameters", path)
+        _check_node(str(node), block, path)
     for key, value in _leaves(content):
         _check_leaf(key, value, path)
     return content
+
+
+def _check_node(name: str, block: Any, path: str) -> None:
+    """Refuses values that stand beside `ros__parameters` instead of in it."""
+    if not isinstance(block, Mapping):
+        raise ScenarioError(name, repr(block), "a block with ros__parameters", path)
+    for key, value in block.items():
+        if key != "ros__parameters":
+            _check_node(f"{name}.{key}", value, path)
+        elif not isinstance(value, Mapping):
+            raise ScenarioError(f"{name}.{key}", repr(value), "a block of parameters", path)
 
 
 def _leaves(block: Mapping[Any, Any], path: str = "") -> Iterator[tuple[str, Any]]:

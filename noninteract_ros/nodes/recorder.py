@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recorder: writes every message of a run, as it came over the wire, into an MCAP file."""
 
-import signal
 import sys
 import time
 from collections.abc import Callable, Sequence
 from datetime import datetime
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from types import FrameType
 from typing import Any
 
 import rclpy
@@ -25,7 +22,8 @@ from noninteract_ros.analysis.run import FILE_NAME
 from noninteract_ros.errors import InputError, NoninteractError, RecordingError
 from noninteract_ros.nodes.feed import Feed
 from noninteract_ros.nodes.messages import Level, to_diagnostics, to_status
-from noninteract_ros.nodes.parameter_files import files_of, rewrite
+from noninteract_ros.nodes.parameter_files import files_of
+from noninteract_ros.nodes.program import StopSignal, init
 
 GLOBAL_TOPICS = ("/diagnostics", "/clock")
 POLL_PERIOD = 0.004
@@ -206,18 +204,6 @@ class RecorderNode(Node):
         self._diagnostics.publish(to_diagnostics(time.time_ns(), [status]))
 
 
-class StopSignal:
-    """Turns SIGINT and SIGTERM into a flag, so that the file is finished first."""
-
-    def __init__(self) -> None:
-        self.came = False
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._note)
-
-    def _note(self, number: int, frame: FrameType | None) -> None:
-        self.came = True
-
-
 def _known_topic(text: str) -> tuple[str, str]:
     """Name and type in an entry of the parameter `topics`."""
     parts = text.split()
@@ -234,10 +220,8 @@ def main(args: Sequence[str] | None = None) -> int:
     stop = StopSignal()
     argv = list(sys.argv if args is None else args)
     try:
-        with TemporaryDirectory() as folder:
-            ros_arguments = rewrite(argv, Path(folder))
-            rclpy.init(args=ros_arguments, signal_handler_options=SignalHandlerOptions.NO)
-            node = RecorderNode(next(iter(files_of(argv)), ""))
+        init(argv, SignalHandlerOptions.NO)
+        node = RecorderNode(next(iter(files_of(argv)), ""))
         node.run(lambda: stop.came)
         writer = node.writer
         lost = f", {node.lost} lost" if node.lost else ""

@@ -18,7 +18,8 @@ from noninteract_ros.clock import tick_stamp
 from noninteract_ros.nodes import messages
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.messages import Level
-from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker, run_program
+from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker
+from noninteract_ros.nodes.program import run_program
 
 RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is sent again
 

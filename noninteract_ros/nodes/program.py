@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Start and end of a program: wrong arguments in one line, signals without a trace."""
+
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import FrameType
+from typing import Protocol
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
+
+from noninteract_ros.errors import ScenarioError
+from noninteract_ros.nodes.parameter_files import origin_of_key, rewrite
+
+
+class Runnable(Protocol):
+    """A node that a program consists of."""
+
+    def run(self) -> None:
+        """Runs until the context is shut down."""
+
+    def destroy_node(self) -> None:
+        """Ends the node."""
+
+
+class StopSignal:
+    """Turns SIGINT and SIGTERM into a flag: no exception breaks off what is being done.
+
+    Attributes:
+        came: Whether one of the signals has come.
+    """
+
+    def __init__(self) -> None:
+        self.came = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._note)
+
+    def _note(self, number: int, frame: FrameType | None) -> None:
+        self.came = True
+
+
+@contextmanager
+def until_shutdown(context: rclpy.Context) -> Iterator[None]:
+    """Ends the block quietly where it fails because the context was shut down."""
+    try:
+        yield
+    except ExternalShutdownException:
+        pass
+    except RuntimeError:  # What publishing, and most else, raises without a context.
+        if context.ok():
+            raise
+
+
+def init(arguments: Sequence[str], signals: SignalHandlerOptions) -> None:
+    """Starts ROS with a command line whose parameter files are made readable for it.
+
+    Raises:
+        ScenarioError: An argument or a parameter file is wrong.
+    """
+    with TemporaryDirectory() as folder:
+        ros_arguments = rewrite(arguments, Path(folder))
+        try:
+            plain = remove_ros_args(ros_arguments)[1:]
+            if plain:
+                raise ScenarioError("(arguments)", " ".join(plain), "--ros-args ...")
+            rclpy.init(args=ros_arguments, signal_handler_options=signals)
+        except RuntimeError as error:
+            found = " ".join(str(error).split())
+            raise ScenarioError("(arguments)", found, "--ros-args ...") from error
+
+
+def run_program(make: Callable[[], Runnable], arguments: Sequence[str] | None) -> int:
+    """Main function of a program.
+
+    Args:
+        make: Makes its node.
+        arguments: Command line, by default the one of this process.
+
+    Returns:
+        Exit status: 0 after SIGINT or SIGTERM, 2 where an argument or a parameter is wrong; that
+        is said in one line.
+    """
+    argv = list(sys.argv if arguments is None else arguments)
+    # ROS shuts the context down at a signal, then calls the handler that it found.
+    stop = StopSignal()
+    node = None
+    try:
+        init(argv, SignalHandlerOptions.ALL)
+        with until_shutdown(rclpy.get_default_context()):
+            node = make()
+            # The loop must not wait for the executor's thread for long.
+            sys.setswitchinterval(0.0005)
+            if not stop.came:
+                node.run()
+    except ScenarioError as error:
+        named = error.file or origin_of_key(argv, error.key)
+        print(ScenarioError(error.key, error.found, error.allowed, named), file=sys.stderr)
+        return 2
+    finally:
+        if node is not None:
+            node.destroy_node()
+        rclpy.try_shutdown()
+    return 0
