@@ -55,8 +55,8 @@ class TaskError:
     """Tracking state of all subtasks, stacked, shape (n,) each.
 
     Attributes:
-        e: x - x_d.
-        e_rate: Its time derivative.
+        e: x - x_d; for rotations log(R R_d').
+        e_rate: Velocity error dx/dt - dx_d/dt; for rotations omega - omega_d.
         reference_velocity: Desired velocity.
         reference_acceleration: Desired acceleration.
         force: Force input of the sources, added to (30), remark 1.

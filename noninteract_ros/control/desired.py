@@ -2,7 +2,9 @@
 """The desired motion of one subtask: continuous whoever asks for it, and at rest when nobody does.
 
 Set-points, rates, take-overs and stops are shaped by ruckig within bounds of velocity,
-acceleration and jerk. A full reference passes unchanged once it has been taken over.
+acceleration and jerk. A full reference passes unchanged once it has been taken over. Rotations are
+shaped as rotation vectors from where they are to go, which leads along SO(3) with the exact
+derivatives; their angular velocity is never faster than the rotation vector changes.
 """
 
 import numpy as np
@@ -11,12 +13,13 @@ from ruckig import ControlInterface, InputParameter, OutputParameter, Result, Ru
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.inputs import Motion, Rate, Target
 from noninteract_ros.control.reference import Reference
+from noninteract_ros.subtasks.layout import Layout
 
 LONGEST = 1000.0  # [s] how far ahead a motion is planned
 
 
 class Shaper:
-    """One step at a time towards a state, within limits.
+    """One step at a time towards a state, within limits; all numbers are plain.
 
     An acceleration beyond the limits is cut off at once: to lead it back with bounded jerk would
     carry the motion far away. A start from which no motion can be planned becomes rest.
@@ -74,14 +77,15 @@ class DesiredMotion:
         limits: Bounds of velocity, acceleration and jerk, shape (3, p).
         direct: Whether a full reference is taken over at once, with the jump it brings, instead
             of being approached from where the desired motion is.
+        layout: Layout of the subtask's values; plain numbers, if None.
     """
 
-    def __init__(self, limits: Array, direct: bool) -> None:
-        dim = limits.shape[1]
-        self._limits, self._direct = limits, direct
+    def __init__(self, limits: Array, direct: bool, layout: Layout | None = None) -> None:
+        layout = layout or Layout.numbers(limits.shape[1])
+        self._limits, self._direct, self._layout = limits, direct, layout
         self._shaper = Shaper(limits)
-        self._zero = Target(np.zeros(dim), np.zeros(dim))
-        self.rest_at(np.zeros(dim))
+        self._zero = Target(np.zeros(layout.dim), np.zeros(layout.dim))
+        self.rest_at(layout.identity)
 
     @property
     def now(self) -> Reference:
@@ -89,8 +93,8 @@ class DesiredMotion:
         return self._now
 
     def rest_at(self, x: Array) -> None:
-        """Starts anew: at rest at x, shape (p,)."""
-        self._now = Reference.still(x.copy())
+        """Starts anew: at rest at x, shape (size,)."""
+        self._now = Reference.still(x, self._layout)
         self._followed: Reference | None = None
         self._gap: Reference | None = None
 
@@ -112,47 +116,50 @@ class DesiredMotion:
 
     def _shape(self, motion: Target | Rate | None, step: float) -> Reference:
         if isinstance(motion, Target):
-            shaped, done = self._shaper.towards(self._now, motion, step)
+            shaped, done = self._towards(motion, step)
             arrived = done and not motion.velocity.any()
-            return Reference.still(motion.position) if arrived else shaped
+            return Reference.still(motion.position, self._layout) if arrived else shaped
         if isinstance(motion, Rate):
-            return self._shaper.at_rate(self._now, motion.velocity, step)[0]
+            return self._at_rate(motion.velocity, step)[0]
         if not (self._now.velocity.any() or self._now.acceleration.any()):
             return self._now
-        shaped, done = self._shaper.at_rate(self._now, self._zero.velocity, step)
-        return Reference.still(shaped.position) if done else shaped
+        shaped, done = self._at_rate(self._zero.velocity, step)
+        return Reference.still(shaped.position, self._layout) if done else shaped
+
+    def _towards(self, target: Target, step: float) -> tuple[Reference, bool]:
+        """Shapes in coordinates about the target's rotations, which are zero there."""
+        layout = self._layout
+        origin = Reference.still(layout.origin(target.position), layout)
+        goal = Target(layout.difference(target.position, origin.position), target.velocity)
+        shaped, done = self._shaper.towards(self._now.minus(origin, layout), goal, step)
+        return origin.plus(shaped, layout), done
+
+    def _at_rate(self, rate: Array, step: float) -> tuple[Reference, bool]:
+        """Shapes in coordinates about the rotations that it has."""
+        layout = self._layout
+        origin = Reference.still(layout.origin(self._now.position), layout)
+        shaped, done = self._shaper.at_rate(self._now.minus(origin, layout), rate, step)
+        return origin.plus(shaped, layout), done
 
     def _follow(self, motion: Reference, step: float) -> Reference:
         """The reference plus a gap that closes smoothly; no gap in a direct take-over."""
         if self._direct:
             return motion
         if self._jumps(motion, step):
-            self._gap = _difference(self._now, motion.at(-step))
+            self._gap = self._now.minus(motion.at(-step, self._layout), self._layout)
         if self._gap is not None and step > 0.0:
             self._gap, closed = self._shaper.towards(self._gap, self._zero, step)
             if closed:
                 self._gap = None
-        return motion if self._gap is None else _sum(motion, self._gap)
+        return motion if self._gap is None else motion.plus(self._gap, self._layout)
 
     def _jumps(self, motion: Reference, step: float) -> bool:
         """Whether a reference is new or leaves its own path by more than the limits allow."""
         if self._followed is None:
             return True
-        gap = _difference(motion, self._followed.at(step))
+        gap = motion.minus(self._followed.at(step, self._layout), self._layout)
         max_velocity, max_acceleration, _ = self._limits
         return bool(
             (np.abs(gap.position) > max_velocity * step).any()
             or (np.abs(gap.velocity) > max_acceleration * step).any()
         )
-
-
-def _difference(a: Reference, b: Reference) -> Reference:
-    return Reference(
-        a.position - b.position, a.velocity - b.velocity, a.acceleration - b.acceleration
-    )
-
-
-def _sum(a: Reference, b: Reference) -> Reference:
-    return Reference(
-        a.position + b.position, a.velocity + b.velocity, a.acceleration + b.acceleration
-    )

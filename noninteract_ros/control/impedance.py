@@ -9,6 +9,7 @@ import numpy as np
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import key
+from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.subtask import Subtask
 
 
@@ -16,24 +17,27 @@ from noninteract_ros.subtasks.subtask import Subtask
 class ImpedanceSettings:
     """Configuration of one subtask's impedance.
 
-    Each list has one number for all coordinates, one per axis, or one per coordinate.
+    Each list has one number for all coordinates, one per axis of an element, or one per axis of
+    each element. A rotation has one number, after those of its element's axes: with the same
+    stiffness about all axes, and only then, its torque is the exact gradient of a potential.
     """
 
-    stiffness: tuple[float, ...] = key("Stiffness [N/m]", minimum=0.0, live=True)
-    damping: tuple[float, ...] = key("Damping [N s/m]", positive=True, live=True)
+    stiffness: tuple[float, ...] = key("Stiffness [N/m; N m/rad]", minimum=0.0, live=True)
+    damping: tuple[float, ...] = key("Damping [N s/m; N m s/rad]", positive=True, live=True)
     inertia: tuple[float, ...] = key(
-        "Desired inertia [kg], remark 2; by default the team's own, M_i = S_i' M S_i",
+        "Desired inertia [kg; kg m^2], remark 2; by default the team's own, M_i = S_i' M S_i",
         (),
         positive=True,
         live=True,
     )
     potential: str = key(
-        "Shape of the potential; saturating bounds the force of each coordinate by max_force",
+        "Shape of the potential; saturating bounds each coordinate's force, and the torque of each"
+        " rotation, by max_force",
         "linear",
         choices=("linear", "saturating"),
     )
     max_force: tuple[float, ...] = key(
-        "Bound of a saturating potential's force [N]", (), positive=True, live=True
+        "Bound of a saturating potential's force [N; N m]", (), positive=True, live=True
     )
 
 
@@ -46,25 +50,37 @@ class Impedance:
         damping: D, diagonal, shape (n,) [N s/m].
         max_force: Bound of each coordinate's spring force, shape (n,) [N]; inf where linear.
         inertias: Desired inertia of each subtask, shape (p_i,) [kg], or None for its own.
+        rotations: Coordinates of the rotations, shape (r, 3); None without any. The three of one
+            have the same stiffness and bound, and a potential of the angle |e|: `Layout` proves
+            that its gradient is exact.
     """
 
     stiffness: Array
     damping: Array
     max_force: Array
     inertias: tuple[Array | None, ...]
+    rotations: Array | None = None
 
     def force(self, e: Array) -> Array:
-        """h(e), the exact gradient of the potential, shape (n,) [N]."""
+        """h(e), the exact gradient of the potential, shape (n,) [N; N m]."""
         linear = self.stiffness * e
-        return linear / np.sqrt(1.0 + (linear / self.max_force) ** 2)
+        return linear / np.sqrt(1.0 + self._overload(linear))
 
     def potential(self, e: Array) -> Array:
         """V(e) by coordinate, shape (n,) [J]: K e^2 / 2 where linear.
 
         Saturating: F^2/K (sqrt(1 + (K e / F)^2) - 1), written so that F = inf is the linear case.
+        The three of a rotation have the angle |e| under the root, and add up to its potential.
         """
         linear = self.stiffness * e
-        return linear * e / (1.0 + np.sqrt(1.0 + (linear / self.max_force) ** 2))
+        return linear * e / (1.0 + np.sqrt(1.0 + self._overload(linear)))
+
+    def _overload(self, linear: Array) -> Array:
+        """Square of the linear force over its bound; for rotations that of the torque's size."""
+        square = (linear / self.max_force) ** 2
+        if self.rotations is not None:
+            square[self.rotations] = square[self.rotations].sum(axis=1, keepdims=True)
+        return square
 
 
 def stack_impedance(
@@ -83,7 +99,13 @@ def stack_impedance(
         tuple(
             spread(task, "inertia", item.inertia) if item.inertia else None for task, item in pairs
         ),
+        _rotations(subtasks),
     )
+
+
+def _rotations(subtasks: Sequence[Subtask]) -> Array | None:
+    layout = Layout.joined([task.layout for task in subtasks])
+    return layout.angular if layout.rotates else None
 
 
 def _max_force(subtask: Subtask, settings: ImpedanceSettings) -> Array:
@@ -93,17 +115,26 @@ def _max_force(subtask: Subtask, settings: ImpedanceSettings) -> Array:
 
 
 def spread(subtask: Subtask, name: str, values: Sequence[float]) -> Array:
-    """Numbers for each coordinate of a subtask, from one, one per axis, or one per coordinate.
+    """Numbers for each coordinate of a subtask, shape (p,), from one or from some per element.
+
+    Args:
+        subtask: The subtask.
+        name: Key that holds the numbers, for error messages.
+        values: One for all; or one per axis of an element, then one for its rotation, if it has
+            one; or that for each element.
 
     Raises:
         ScenarioError: Any other count.
     """
-    axes = len(subtask.axes)
-    if len(values) == 1:
-        return np.full(subtask.dim, values[0])
-    if len(values) == axes:
-        return np.tile(values, len(subtask.elements))
-    if len(values) == subtask.dim:
-        return np.array(values)
-    counts = " or ".join(str(count) for count in sorted({1, axes, subtask.dim}))
-    raise ScenarioError(f"{subtask.name}.{name}", list(values), f"{counts} numbers")
+    parts = (*subtask.axes, "rotation") if subtask.rotates else subtask.axes
+    total = len(parts) * len(subtask.elements)
+    if len(values) not in (1, len(parts), total):
+        counts = " or ".join(str(count) for count in sorted({1, len(parts), total}))
+        allowed = f"{counts} numbers"
+        if subtask.rotates:
+            allowed += f" ({', '.join(parts)} of each element)"
+        raise ScenarioError(f"{subtask.name}.{name}", list(values), allowed)
+    numbers = np.resize(np.array(values), (len(subtask.elements), len(parts)))
+    if subtask.rotates:
+        numbers = np.hstack([numbers, numbers[:, -1:], numbers[:, -1:]])
+    return numbers.ravel()

@@ -19,8 +19,8 @@ class Target:
     """A set-point to reach within the subtask's limits.
 
     Attributes:
-        position: Where to go, shape (p,) [m].
-        velocity: Velocity to have there, shape (p,) [m/s].
+        position: Where to go, shape (size,) [m; quaternions].
+        velocity: Velocity to have there, shape (p,) [m/s; rad/s].
     """
 
     position: Array
@@ -29,14 +29,14 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """A velocity to reach within the subtask's limits, shape (p,) [m/s]."""
+    """A velocity to reach within the subtask's limits, shape (p,) [m/s; rad/s]."""
 
     velocity: Array
 
 
 @dataclass(frozen=True, slots=True)
 class Force:
-    """A force input tau~_c (remark 1), shape (p,) [N]."""
+    """A force input tau~_c (remark 1), shape (p,) [N; N m]."""
 
     force: Array
 

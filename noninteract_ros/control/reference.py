@@ -7,11 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.subtasks.layout import Layout, Motion
 
 
 @dataclass(frozen=True, slots=True)
 class Reference:
     """Desired motion of one subtask, in its own coordinates (float64, SI units).
+
+    Layouts say which numbers are quaternions; without one, all are plain.
 
     Attributes:
         position: Desired value xᵈ, shape (size,).
@@ -24,15 +27,28 @@ class Reference:
     acceleration: Array
 
     @classmethod
-    def still(cls, position: ArrayLike) -> "Reference":
+    def still(cls, position: ArrayLike, layout: Layout | None = None) -> "Reference":
         """Rest at a position of shape (size,), which is copied."""
         held = np.array(position, dtype=np.float64)
-        return cls(held, np.zeros_like(held), np.zeros_like(held))
+        dim = held.size if layout is None else layout.dim
+        return cls(held, np.zeros(dim), np.zeros(dim))
 
-    def at(self, dt: float) -> "Reference":
+    def at(self, dt: float, layout: Layout | None = None) -> "Reference":
         """The same motion `dt` seconds later, its acceleration held."""
-        return Reference(
-            self.position + dt * self.velocity + (0.5 * dt * dt) * self.acceleration,
-            self.velocity + dt * self.acceleration,
-            self.acceleration,
-        )
+        return Reference(*(layout or self._plain).ahead(self._motion, dt))
+
+    def minus(self, base: "Reference", layout: Layout) -> "Reference":
+        """The gap from another motion to this one, all of it of shape (dim,)."""
+        return Reference(*layout.gap(self._motion, base._motion))
+
+    def plus(self, gap: "Reference", layout: Layout) -> "Reference":
+        """The motion that a gap, all of it of shape (dim,), leads away from this one."""
+        return Reference(*layout.moved(self._motion, gap._motion))
+
+    @property
+    def _motion(self) -> Motion:
+        return self.position, self.velocity, self.acceleration
+
+    @property
+    def _plain(self) -> Layout:
+        return Layout.numbers(self.position.size)

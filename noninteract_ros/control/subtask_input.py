@@ -20,7 +20,11 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class InputSettings:
-    """Configuration of how one subtask is led."""
+    """Configuration of how one subtask is led.
+
+    Lists have one number for all, or as `ImpedanceSettings` has them. A rotation's number bounds
+    each component of its rotation vector.
+    """
 
     authority: str = key("Source in force", "hold", choices=AUTHORITIES, live=True)
     timeout: float = key("Silence after which the subtask holds [s]", 0.5, positive=True)
@@ -31,17 +35,17 @@ class InputSettings:
         choices=("shaped", "direct"),
     )
     max_velocity: tuple[float, ...] = key(
-        "Velocity bound of shaped motions [m/s]", (1.0,), positive=True
+        "Velocity bound of shaped motions [m/s; rad/s]", (1.0,), positive=True
     )
     max_acceleration: tuple[float, ...] = key(
-        "Acceleration bound of shaped motions [m/s^2]", (5.0,), positive=True
+        "Acceleration bound of shaped motions [m/s^2; rad/s^2]", (5.0,), positive=True
     )
     max_jerk: tuple[float, ...] = key(
-        "Jerk bound of shaped motions [m/s^3]", (50.0,), positive=True
+        "Jerk bound of shaped motions [m/s^3; rad/s^3]", (50.0,), positive=True
     )
-    max_wrench: tuple[float, ...] = key("Bound of a force input [N]", (50.0,), positive=True)
+    max_wrench: tuple[float, ...] = key("Bound of a force input [N; N m]", (50.0,), positive=True)
     max_wrench_rate: tuple[float, ...] = key(
-        "Rate bound of a force input [N/s]", (500.0,), positive=True
+        "Rate bound of a force input [N/s; N m/s]", (500.0,), positive=True
     )
 
 
@@ -76,15 +80,16 @@ class SubtaskInput:
         self._timeout = settings.timeout
         names = ("max_velocity", "max_acceleration", "max_jerk")
         limits = np.array([spread(subtask, name, getattr(settings, name)) for name in names])
-        self._desired = DesiredMotion(limits, settings.takeover == "direct")
+        self._layout = subtask.layout
+        self._desired = DesiredMotion(limits, settings.takeover == "direct", self._layout)
         self._max_force = spread(subtask, "max_wrench", settings.max_wrench)
         self._max_force_rate = spread(subtask, "max_wrench_rate", settings.max_wrench_rate)
         self._force: Array = np.zeros(subtask.dim)
 
     def rest_at(self, x: Array) -> None:
-        """Holds at x, shape (p,), until the source in force speaks again."""
+        """Holds at x, shape (size,), until the source in force speaks again."""
         self._desired.rest_at(x)
-        self._force = np.zeros_like(x)
+        self._force = np.zeros(self._layout.dim)
 
     def resting(self, now: float) -> Led:
         """At rest where it is, whatever the sources say up to `now` [s]."""
@@ -112,7 +117,7 @@ class SubtaskInput:
         motion = self._fresh(source.motion(now), now) if source else None
         force = self._fresh(source.force(now), now) if source else None
         self._force = self._shaped(force[1].force if force else np.zeros_like(self._force), step)
-        reference = self._desired.advance(_as_of(now, *motion) if motion else None, step)
+        reference = self._desired.advance(self._as_of(now, *motion) if motion else None, step)
         silent = source is not None and motion is None and force is None
         return Led(reference, self._force, self.authority, silent)
 
@@ -132,7 +137,8 @@ class SubtaskInput:
         change = self._max_force_rate * step
         return self._force + np.clip(bounded - self._force, -change, change)
 
-
-def _as_of(now: float, stamp: float, motion: Motion) -> Motion:
-    """What a motion that was given for `stamp` asks for now."""
-    return motion.at(now - stamp) if isinstance(motion, Reference) else motion
+    def _as_of(self, now: float, stamp: float, motion: Motion) -> Motion:
+        """What a motion that was given for `stamp` asks for now."""
+        if isinstance(motion, Reference):
+            return motion.at(now - stamp, self._layout)
+        return motion

@@ -47,7 +47,7 @@ class Tick:
         torque: Control torque, shape (n,) [N or N m].
         state: Team dynamics at the state.
         task: Actual subtask values and Jacobians.
-        x_rate: Actual subtask velocities, shape (n,) [m/s].
+        x_rate: Actual subtask velocities, shape (n,) [m/s; rad/s].
         error: Tracking state of the subtasks.
         led: What each subtask is asked to do.
         dynamics: Task dynamics at the state.
@@ -172,7 +172,7 @@ class TeamController:
             item.resting(now) if stopped else item.advance(now, step)
             for item in self.inputs.values()
         )
-        error = _error(task, v, led)
+        error = self._error(task, v, led)
         dynamics = task_dynamics(state, task, self.stack.slices, self._mode.impedance.inertias)
         acceleration = self._acceleration(now, state, task, error, dynamics)
         wanted = joint_acceleration(dynamics, v, acceleration)
@@ -214,7 +214,7 @@ class TeamController:
         return ""
 
     def _rest_at(self, x: Array) -> None:
-        for item, part in zip(self.inputs.values(), self.stack.slices, strict=True):
+        for item, part in zip(self.inputs.values(), self.stack.value_slices, strict=True):
             item.rest_at(x[part])
 
     def _acceleration(
@@ -251,10 +251,10 @@ class TeamController:
             return task.J @ (-self._stop_rate * state.v) + task.J_rate @ state.v
         return commanded_acceleration(mode.law, dynamics, error, mode.impedance)
 
-
-def _error(task: SubtaskState, v: Array, led: Sequence[Led]) -> TaskError:
-    position = np.concatenate([item.reference.position for item in led])
-    velocity = np.concatenate([item.reference.velocity for item in led])
-    acceleration = np.concatenate([item.reference.acceleration for item in led])
-    force = np.concatenate([item.force for item in led])
-    return TaskError(task.x - position, task.J @ v - velocity, velocity, acceleration, force)
+    def _error(self, task: SubtaskState, v: Array, led: Sequence[Led]) -> TaskError:
+        position = np.concatenate([item.reference.position for item in led])
+        velocity = np.concatenate([item.reference.velocity for item in led])
+        acceleration = np.concatenate([item.reference.acceleration for item in led])
+        force = np.concatenate([item.force for item in led])
+        e = self.stack.difference(task.x, position)
+        return TaskError(e, task.J @ v - velocity, velocity, acceleration, force)

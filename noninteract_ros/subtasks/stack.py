@@ -7,6 +7,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import SubtaskError
+from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.team import Team, TeamState
 
@@ -20,6 +21,12 @@ class SubtaskStack:
         team: The robots.
         subtasks: Subtasks with different names, whose coordinates add up to the team's.
 
+    Attributes:
+        names: Names of the subtasks, in order.
+        layout: Layout of all values, one after the other.
+        slices: Coordinates of each subtask in a stacked velocity, error or force.
+        value_slices: Numbers of each subtask in a stacked value.
+
     Raises:
         SubtaskError: Assumption 1, 2 or 3 does not hold; the text gives the dimensions.
     """
@@ -30,20 +37,23 @@ class SubtaskStack:
         if len(set(self.names)) != len(self.names):
             raise SubtaskError(f"each subtask needs a name of its own, found {list(self.names)}")
         self._check_count(team.n)
-        ends = np.cumsum([subtask.dim for subtask in subtasks]).tolist()
-        self.slices = tuple(
-            slice(end - subtask.dim, end) for end, subtask in zip(ends, subtasks, strict=True)
-        )
+        self.layout = Layout.joined([subtask.layout for subtask in subtasks])
+        self.slices = _slices([subtask.dim for subtask in subtasks])
+        self.value_slices = _slices([subtask.size for subtask in subtasks])
         self._check_rank(team)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
-        """Stacked value (n,), Jacobian (n, n) and Jacobian rate (n, n)."""
+        """Stacked value (size,), Jacobian (n, n) and Jacobian rate (n, n)."""
         parts = [subtask.evaluate(state) for subtask in self.subtasks]
         return SubtaskState(
             np.concatenate([part.x for part in parts]),
             np.concatenate([part.J for part in parts]),
             np.concatenate([part.J_rate for part in parts]),
         )
+
+    def difference(self, x: Array, x_d: Array) -> Array:
+        """Error of stacked values towards others, shape (n,); see `Layout.difference`."""
+        return self.layout.difference(x, x_d)
 
     def _check_count(self, n: int) -> None:
         """Assumption 2; fewer coordinates would leave internal dynamics, assumption 1."""
@@ -77,3 +87,8 @@ class SubtaskStack:
             f"assumption 3: the stacked Jacobian has rank {max(ranks)} of {team.n} "
             f"(by subtask: {own}); the subtasks depend on each other"
         )
+
+
+def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
+    ends = np.cumsum(sizes).tolist()
+    return tuple(slice(end - size, end) for end, size in zip(ends, sizes, strict=True))

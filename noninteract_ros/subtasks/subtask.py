@@ -3,8 +3,10 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from functools import cached_property
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.team.team import TeamState
 
 
@@ -13,8 +15,8 @@ class SubtaskState:
     """Value and differential of one subtask, or of several stacked ones.
 
     Attributes:
-        x: Value phi(q), shape (p,).
-        J: Jacobian, shape (p, n): dx/dt = J v.
+        x: Value phi(q), shape (size,).
+        J: Jacobian, shape (p, n): dx/dt = J v, of rotations the angular velocity.
         J_rate: Its time derivative along the motion, shape (p, n).
     """
 
@@ -26,21 +28,42 @@ class SubtaskState:
 class Subtask(ABC):
     """A smooth map from the team's configuration to the coordinates of one goal.
 
+    A value runs over the elements; each has its positions along the axes and then, where the
+    subtask rotates, a quaternion (x, y, z, w), whose velocity is the angular velocity.
+
     Attributes:
         name: Name in the scenario; prefixes its topics.
         elements: Names of the bodies or edges that its messages list, in order.
-        axes: Axes of the world that each element has.
-        dim: Number of coordinates p; the vector runs over elements, then axes.
+        axes: Axes, out of x, y and z, that each element has.
+        rotates: Whether each element has a rotation.
+        dim: Number of coordinates p of a velocity.
+        size: Number of numbers of a value.
     """
 
     name: str
     elements: tuple[str, ...]
     axes: tuple[str, ...]
+    rotates: bool = False
+
+    @cached_property
+    def layout(self) -> Layout:
+        """Which numbers of a value are positions and which are quaternions."""
+        count = len(self.elements)
+        return Layout((len(self.axes),) * count, (self.rotates,) * count)
 
     @property
     def dim(self) -> int:
-        """Number of coordinates."""
-        return len(self.elements) * len(self.axes)
+        """Number of coordinates of a velocity."""
+        return self.layout.dim
+
+    @property
+    def size(self) -> int:
+        """Number of numbers of a value."""
+        return self.layout.size
+
+    def difference(self, x: Array, x_d: Array) -> Array:
+        """Error of a value towards another, shape (p,): x - x_d, for rotations log(R R_d')."""
+        return self.layout.difference(x, x_d)
 
     @abstractmethod
     def evaluate(self, state: TeamState) -> SubtaskState:
