@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scenario: the one file that every program of a run is started with."""
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -13,7 +14,7 @@ from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_of
 from noninteract_ros.operator.haptic import HapticDevice, HapticSettings
 from noninteract_ros.operator.planner import Formation, FormationPlanner, PlannerSettings
-from noninteract_ros.schema import Key, describe, join, key, keys_of, load
+from noninteract_ros.schema import Key, convert, describe, join, key, keys_of, load
 from noninteract_ros.simulation.push import ScheduledPush
 from noninteract_ros.simulation.subtask_object import ObjectSettings, SubtaskObject
 from noninteract_ros.simulation.team_simulation import TeamSimulation
@@ -22,6 +23,7 @@ from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.registry import ROBOT_MODELS, RobotBlock
 from noninteract_ros.team.team import Team
 
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # What may be a part of a topic's name.
 # Every ROS node has these of its own.
 ROS_KEYS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 
@@ -110,7 +112,7 @@ class Scenario:
         named = _named_blocks(values)
         optional = ("object", "haptic", "planner")
         general = load(General, values, ignore=(*named, *optional))
-        planner, formations = _load_planner(values.get("planner"))
+        planner, formations = _load_planner(values)
         scenario = cls(
             general,
             {name: _load_robot(name, _block(values, name)) for name in general.robots},
@@ -230,13 +232,18 @@ def _named_blocks(values: Mapping[str, Any]) -> list[str]:
     names: list[str] = []
     reserved = {item.name for item in fields(General)} | {"object", "haptic", "planner"}
     for listing in ("robots", "subtasks", "pushes"):
-        for name in values.get(listing) or ():
-            if not isinstance(name, str) or not name.isidentifier() or name in reserved:
-                raise ScenarioError(listing, repr(name), "names of letters, digits and _")
+        for name in _listed(listing, values.get(listing, ())):
+            if not NAME.fullmatch(name) or name in reserved:
+                allowed = "names of letters, digits and _ that are no keys of a scenario"
+                raise ScenarioError(listing, repr(name), allowed)
             if name in names:
                 raise ScenarioError(listing, repr(name), "names that are used once")
             names.append(name)
     return names
+
+
+def _listed(listing: str, names: Any) -> tuple[str, ...]:
+    return tuple(convert(listing, names, tuple[str, ...], Key("Names")))
 
 
 def _block(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -253,14 +260,14 @@ def _load_optional(block: type, values: Mapping[str, Any], name: str) -> Any:
 
 def _load_robot(name: str, values: Mapping[str, Any]) -> RobotBlock:
     model = values.get("model", "point_mass")
-    if model not in ROBOT_MODELS:
+    if not isinstance(model, str) or model not in ROBOT_MODELS:
         raise ScenarioError(f"{name}.model", repr(model), one_of(ROBOT_MODELS, str(model)))
     return load(ROBOT_MODELS[model], values, name)
 
 
 def _load_subtask(name: str, values: Mapping[str, Any]) -> SubtaskSpec:
     kind = values.get("kind")
-    if kind not in SUBTASK_KINDS:
+    if not isinstance(kind, str) or kind not in SUBTASK_KINDS:
         found = "nothing" if kind is None else repr(kind)
         raise ScenarioError(f"{name}.kind", found, one_of(SUBTASK_KINDS, str(kind)))
     blocks = (SUBTASK_KINDS[kind], ImpedanceSettings, InputSettings)
@@ -276,12 +283,13 @@ def _load_subtask(name: str, values: Mapping[str, Any]) -> SubtaskSpec:
 
 
 def _load_planner(
-    values: Mapping[str, Any] | None,
+    scenario: Mapping[str, Any],
 ) -> tuple[PlannerSettings | None, dict[str, Formation]]:
-    if values is None:
+    if "planner" not in scenario:
         return None, {}
-    names: Sequence[str] = values.get("formations") or ()
-    settings = load(PlannerSettings, values, "planner", ignore=tuple(names))
+    values = _block(scenario, "planner")
+    names = _listed("planner.formations", values.get("formations", ()))
+    settings = load(PlannerSettings, values, "planner", ignore=names)
     formations = {}
     for name in settings.formations:
         path = f"planner.{name}"

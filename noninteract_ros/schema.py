@@ -78,7 +78,7 @@ def load(
     known = {item.name: item for item in keys_of(block)}
     for name in values:
         if name not in known and name not in ignore:
-            raise ScenarioError(join(path, name), "an unknown key", one_of(known, name))
+            raise ScenarioError(join(path, name), "an unknown key", one_of(known, str(name)))
     arguments = {}
     for name, item in known.items():
         if name in values:
@@ -107,16 +107,16 @@ def describe(block: Any, path: str = "") -> Iterator[tuple[str, Any, Key, Any]]:
 
 def join(path: str, name: str) -> str:
     """Dotted key."""
-    return f"{path}.{name}" if path else name
+    return f"{path}.{name}" if path else str(name)
 
 
 def convert(path: str, value: Any, hint: Any, rule: Key) -> Any:
     """Checks one value and converts it to the annotated type (int to float, list to tuple)."""
     if hint in (tuple[float, ...], tuple[str, ...]):
         item_type = float if hint == tuple[float, ...] else str
-        if not isinstance(value, (list, tuple)) and not hasattr(value, "tolist"):
+        items = _plain(value)
+        if not isinstance(items, (list, tuple)):
             raise ScenarioError(path, _show(value), type_name(hint))
-        items = value.tolist() if hasattr(value, "tolist") else value
         return tuple(_convert_item(path, item, item_type, rule, value) for item in items)
     return _convert_item(path, value, hint, rule, value)
 
@@ -135,8 +135,13 @@ def _convert_item(path: str, item: Any, hint: Any, rule: Key, shown: Any) -> Any
     return item
 
 
+def _plain(value: Any) -> Any:
+    """Arrays as lists."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
 def _show(value: Any) -> str:
-    text = repr(list(value) if hasattr(value, "tolist") else value)
+    text = repr(_plain(value))
     return text if len(text) <= 80 else text[:77] + "..."
 
 
