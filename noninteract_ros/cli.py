@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line: `noninteract demo | report | check | repair | bench`."""
 
+import json
 import os
 import sys
 import time
@@ -158,6 +159,31 @@ def repair(
 
     console.print(str(repair_file(file, out)))
     return 0
+
+
+@app.command()
+def check(
+    target: Annotated[str, typer.Argument(help="Name or file of a scenario.")],
+    samples: Annotated[int, typer.Option(min=1, help="Number of random states.")] = 20,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="JSON instead of tables.")] = False,
+) -> int:
+    """Check a scenario, and the law on its team, without running it."""
+    from noninteract_ros.analysis.check import CheckSettings, run_check
+
+    found = run_check(target, CheckSettings(samples, seed))
+    if as_json:
+        print(json.dumps(found.as_dict(), indent=2))
+        return 0 if found.passed else 1
+    console.print(f"[bold]{found.target}[/]")
+    for table in found.tables():
+        console.print(table)
+    for warning in found.warnings:
+        console.print(f"[yellow]warning:[/] {warning}")
+    failed = [item.name for item in found.checks if item.passed is False]
+    if failed:
+        console.print(f"[bold red]Failed:[/] {'; '.join(failed)}")
+    return 0 if found.passed else 1
 
 
 @app.command()
