@@ -56,7 +56,8 @@ class JointSettings:
         model.armature = self._spread(name, model, "armature", nothing)
         model.upperEffortLimit = self._spread(name, model, "effort_limit", model.upperEffortLimit)
         model.lowerEffortLimit = -model.upperEffortLimit
-        model.velocityLimit = self._spread(name, model, "velocity_limit", model.velocityLimit)
+        speeds = self._spread(name, model, "velocity_limit", model.upperVelocityLimit)
+        model.upperVelocityLimit, model.lowerVelocityLimit = speeds, -speeds
         self._limit_positions(name, model)
 
     def _spread(self, name: str, model: pin.Model, entry: str, default: Array) -> Array:

@@ -45,7 +45,7 @@ class Robot:
     @property
     def velocity_limits(self) -> Array:
         """Largest speed of each joint, shape (nv,) [m/s or rad/s]; inf where there is none."""
-        return without_bound(self.model.velocityLimit)
+        return without_bound(self.model.upperVelocityLimit)
 
     @property
     def position_limits(self) -> Array:

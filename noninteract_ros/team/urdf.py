@@ -58,7 +58,7 @@ class UrdfRobot(ArmSettings):
             raise ScenarioError(path, "a URDF that the parser refuses", "a valid URDF") from error
         model.name = name
         model = self._reduced(name, model)
-        for limits in (model.upperEffortLimit, model.velocityLimit):
+        for limits in (model.upperEffortLimit, model.upperVelocityLimit):
             limits[limits == 0.0] = np.inf
         if frame_index(model, self.tool_frame) is None:
             links = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
