@@ -15,11 +15,13 @@ from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_o
 from noninteract_ros.operator.haptic import HapticDevice, HapticSettings
 from noninteract_ros.operator.planner import Formation, FormationPlanner, PlannerSettings
 from noninteract_ros.schema import Key, convert, describe, join, key, keys_of, load
+from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.push import ScheduledPush
 from noninteract_ros.simulation.subtask_object import ObjectSettings, SubtaskObject
 from noninteract_ros.simulation.team_simulation import TeamSimulation
-from noninteract_ros.subtasks.registry import SUBTASK_KINDS, SubtaskBlock
+from noninteract_ros.subtasks.registry import SubtaskBlock, kind_named
 from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.registry import ROBOT_MODELS, RobotBlock
 from noninteract_ros.team.team import Team
 
@@ -174,9 +176,11 @@ class Scenario:
 
     def build_stack(self, team: Team) -> SubtaskStack:
         """The subtasks stacked, with the assumptions of the law checked."""
-        subtasks = [spec.kind.build(name, team) for name, spec in self.subtasks.items()]
+        subtasks: dict[str, Subtask] = {}
+        for name, spec in self.subtasks.items():
+            subtasks[name] = spec.kind.build(name, team, subtasks)
         try:
-            return SubtaskStack(team, subtasks)
+            return SubtaskStack(team, list(subtasks.values()))
         except SubtaskError as error:
             raise ScenarioError("subtasks", list(self.subtasks), str(error)) from error
 
@@ -196,7 +200,7 @@ class Scenario:
     def build_simulation(self, team: Team, stack: SubtaskStack) -> TeamSimulation:
         """The simulated team with its object and pushes."""
         held = SubtaskObject(self.held, stack) if self.held else None
-        return TeamSimulation(team, self.general.rate, held, list(self.pushes.values()))
+        return TeamSimulation(Plant(team), self.general.rate, held, list(self.pushes.values()))
 
     def build_haptic(self, stack: SubtaskStack) -> HapticDevice:
         """The operator's emulated hand and device."""
@@ -266,17 +270,14 @@ def _load_robot(name: str, values: Mapping[str, Any]) -> RobotBlock:
 
 
 def _load_subtask(name: str, values: Mapping[str, Any]) -> SubtaskSpec:
-    kind = values.get("kind")
-    if not isinstance(kind, str) or kind not in SUBTASK_KINDS:
-        found = "nothing" if kind is None else repr(kind)
-        raise ScenarioError(f"{name}.kind", found, one_of(SUBTASK_KINDS, str(kind)))
-    blocks = (SUBTASK_KINDS[kind], ImpedanceSettings, InputSettings)
+    kind = kind_named(f"{name}.kind", values.get("kind"))
+    blocks = (kind, ImpedanceSettings, InputSettings)
     known = tuple(item.name for block in blocks for item in keys_of(block))
     for item in values:
         if item not in known:
             raise ScenarioError(join(name, item), "an unknown key", one_of(known, item))
     return SubtaskSpec(
-        load(SUBTASK_KINDS[kind], values, name, ignore=known),
+        load(kind, values, name, ignore=known),
         load(ImpedanceSettings, values, name, ignore=known),
         load(InputSettings, values, name, ignore=known),
     )

@@ -75,22 +75,34 @@ def task_dynamics(
     slices: tuple[slice, ...],
     desired_inertias: Sequence[Array | None],
 ) -> TaskDynamics:
-    """Terms that every law shares.
+    """Terms that every law shares, at a state; see `task_terms`."""
+    terms = (state.M, state.C, state.g, task.J, task.J_rate)
+    return task_terms(*terms, slices, desired_inertias)
+
+
+def task_terms(
+    M: Array,
+    C: Array,
+    g: Array,
+    J: Array,
+    J_rate: Array,
+    slices: tuple[slice, ...],
+    desired_inertias: Sequence[Array | None],
+) -> TaskDynamics:
+    """Terms that every law shares, from the team's own.
 
     Raises:
         numpy.linalg.LinAlgError: J is exactly singular (assumption 3).
     """
-    S = np.linalg.inv(task.J)
-    MS = state.M @ S
+    S = np.linalg.inv(J)
+    MS = M @ S
     inertia = S.T @ MS
     inertias = tuple(
         inertia[part, part] if desired is None else np.diag(desired)  # Remark 2.
         for part, desired in zip(slices, desired_inertias, strict=True)
     )
     constant = tuple(desired is not None for desired in desired_inertias)
-    return TaskDynamics(
-        state.M, state.C, state.g, task.J, task.J_rate, S, MS, inertia, slices, inertias, constant
-    )
+    return TaskDynamics(M, C, g, J, J_rate, S, MS, inertia, slices, inertias, constant)
 
 
 def commanded_acceleration(

@@ -13,10 +13,12 @@ from noninteract_ros.control.decoupling import (
     commanded_acceleration,
     joint_acceleration,
     task_dynamics,
+    task_terms,
 )
 from noninteract_ros.control.energy import Energy, energy
 from noninteract_ros.control.impedance import Impedance, ImpedanceSettings, stack_impedance
 from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
+from noninteract_ros.last_call import LastCall
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import Team, TeamState
@@ -106,6 +108,7 @@ class TeamController:
         self._state_timeout = state_timeout
         self._bump, self._bump_start = np.zeros(team.n), -np.inf
         self._last: tuple[float, Array] | None = None
+        self._terms = LastCall(task_terms)
 
     @property
     def mode(self) -> Mode:
@@ -173,7 +176,15 @@ class TeamController:
             for item in self.inputs.values()
         )
         error = self._error(task, v, led)
-        dynamics = task_dynamics(state, task, self.stack.slices, self._mode.impedance.inertias)
+        dynamics = self._terms(
+            state.M,
+            state.C,
+            state.g,
+            task.J,
+            task.J_rate,
+            self.stack.slices,
+            self._mode.impedance.inertias,
+        )
         acceleration = self._acceleration(now, state, task, error, dynamics)
         wanted = joint_acceleration(dynamics, v, acceleration)
         torque = self.team.inverse_dynamics(q, v, wanted)

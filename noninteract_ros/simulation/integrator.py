@@ -2,35 +2,58 @@
 """Fixed-step integration of second-order dynamics."""
 
 from collections.abc import Callable
+from typing import Protocol
 
 from noninteract_ros.arrays import Array
 
 
+class Space(Protocol):
+    """Configurations that tangent vectors lead from one to the other."""
+
+    def integrate(self, q: Array, step: Array) -> Array:
+        """Configuration reached from q along a tangent vector."""
+
+    def chart_velocity(self, q_0: Array, q: Array, v: Array) -> Array:
+        """Rate of the tangent vector that leads from q_0 to q, where q moves with velocity v."""
+
+
 def runge_kutta_step(
-    integrate: Callable[[Array, Array], Array],
-    acceleration: Callable[[Array, Array], Array],
+    space: Space,
+    derivative: Callable[[Array, Array], tuple[Array, Array]],
     q: Array,
     v: Array,
     step: float,
-) -> tuple[Array, Array]:
+) -> tuple[Array, Array, Array]:
     """One step of the classical Runge-Kutta method, global error O(step^4).
 
-    The order holds on joints whose tangent space commutes: prismatic, revolute, continuous.
+    On curved spaces it works in the chart of tangent vectors at the start of the step
+    (Runge-Kutta-Munthe-Kaas), which keeps the order.
 
     Args:
-        integrate: Configuration reached from one along a tangent vector.
-        acceleration: dv/dt at a state.
+        space: Where q lives.
+        derivative: Acceleration, and rates of quantities to add up, at a state.
         q: Configuration, shape (nq,).
-        v: Velocity, shape (n,).
+        v: Velocity, shape (nv,).
         step: Step [s].
+
+    Returns:
+        Configuration and velocity after the step, and what the quantities grew by.
     """
     half = 0.5 * step
-    a_1 = acceleration(q, v)
+    a_1, w_1 = derivative(q, v)
     v_2 = v + half * a_1
-    a_2 = acceleration(integrate(q, half * v), v_2)
+    q_2 = space.integrate(q, half * v)
+    a_2, w_2 = derivative(q_2, v_2)
+    u_2 = space.chart_velocity(q, q_2, v_2)
     v_3 = v + half * a_2
-    a_3 = acceleration(integrate(q, half * v_2), v_3)
+    q_3 = space.integrate(q, half * u_2)
+    a_3, w_3 = derivative(q_3, v_3)
+    u_3 = space.chart_velocity(q, q_3, v_3)
     v_4 = v + step * a_3
-    a_4 = acceleration(integrate(q, step * v_3), v_4)
-    q_next = integrate(q, (step / 6.0) * (v + 2.0 * (v_2 + v_3) + v_4))
-    return q_next, v + (step / 6.0) * (a_1 + 2.0 * (a_2 + a_3) + a_4)
+    q_4 = space.integrate(q, step * u_3)
+    a_4, w_4 = derivative(q_4, v_4)
+    u_4 = space.chart_velocity(q, q_4, v_4)
+    sixth = step / 6.0
+    q_next = space.integrate(q, sixth * (v + 2.0 * (u_2 + u_3) + u_4))
+    v_next = v + sixth * (a_1 + 2.0 * (a_2 + a_3) + a_4)
+    return q_next, v_next, sixth * (w_1 + 2.0 * (w_2 + w_3) + w_4)

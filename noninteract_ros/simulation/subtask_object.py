@@ -7,6 +7,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError, one_of
+from noninteract_ros.last_call import LastCall
 from noninteract_ros.schema import key
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import TeamState
@@ -47,6 +48,7 @@ class SubtaskObject:
             if found not in stack.names:
                 raise ScenarioError(f"object.{name}", repr(found), one_of(stack.names, found))
         self._stack = stack
+        self._columns = LastCall(self._decoupling_columns)
         self._carrying = stack.slices[stack.names.index(settings.carried_by)]
         self._grasping = stack.slices[stack.names.index(settings.grasped_by)]
         dim = self._grasping.stop - self._grasping.start
@@ -56,20 +58,32 @@ class SubtaskObject:
         self._mass, self._stiffness = sign * settings.mass, sign * settings.stiffness
         self._rest = np.array(settings.rest) if settings.stiffness else np.zeros(dim)
 
+    def accelerate(self, state: TeamState, load: Array) -> tuple[Array, Array]:
+        """Acceleration of a team that holds the object, and the object's torque, shape (n,) each.
+
+        Args:
+            state: Where the team is.
+            load: Every other torque but Coriolis and gravity torques, shape (n,) [N or N m].
+        """
+        A, b = self.torque_terms(state)
+        free = load - state.C @ state.v - state.g
+        acceleration = np.linalg.solve(state.M - A, free + b)
+        return acceleration, A @ acceleration + b
+
     def torque_terms(self, state: TeamState) -> tuple[Array, Array]:
         """A (n, n) and b (n,) of its torque A dv/dt + b: the mass feels the acceleration."""
         task = self._stack.evaluate(state)
-        S = np.linalg.inv(task.J)
-        carried, grasped = (
-            _decoupling_columns(state.M, S[:, part]) for part in (self._carrying, self._grasping)
-        )
+        carried, grasped = self._columns(state.M, task.J)
         strain = self._stiffness * (task.x[self._grasping] - self._rest)
         A = self._mass * carried @ task.J[self._carrying]
         drift = self._mass * (task.J_rate[self._carrying] @ state.v)
         return A, carried @ drift + grasped @ strain
 
-
-def _decoupling_columns(M: Array, S_i: Array) -> Array:
-    """Columns of Gamma that belong to one subtask: M S_i (S_i' M S_i)^-1, shape (n, p_i)."""
-    MS_i = M @ S_i
-    return np.linalg.solve(S_i.T @ MS_i, MS_i.T).T
+    def _decoupling_columns(self, M: Array, J: Array) -> tuple[Array, Array]:
+        """Columns M S_i (S_i' M S_i)^-1 of Gamma, of carrying and grasping, shape (n, p_i)."""
+        S = np.linalg.inv(J)
+        columns = []
+        for part in (self._carrying, self._grasping):
+            MS_i = M @ S[:, part]
+            columns.append(np.linalg.solve(S[:, part].T @ MS_i, MS_i.T).T)
+        return columns[0], columns[1]

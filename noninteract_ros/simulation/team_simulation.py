@@ -2,47 +2,69 @@
 """A simulated robot team: integrates (2) under control and external torques."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
+from noninteract_ros.simulation.contact import Effect
 from noninteract_ros.simulation.integrator import runge_kutta_step
+from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.push import RESOLUTION, LivePush, ScheduledPush
 from noninteract_ros.simulation.subtask_object import SubtaskObject
-from noninteract_ros.team.team import Team
+
+
+@dataclass(frozen=True)
+class EnergyBalance:
+    """Where the energy of a simulation is, and where it came from and went since the start [J].
+
+    Without an object at subtask level, controls + pushes = stored - stored at the start + lost, to
+    the integrator's error.
+
+    Attributes:
+        stored: Kinetic energy, potential energy in gravity and in all couplings.
+        controls: Work of the control torques.
+        pushes: Work of everything that pushes from outside.
+        lost: Heat in friction and couplings.
+    """
+
+    stored: float
+    controls: float
+    pushes: float
+    lost: float
 
 
 class TeamSimulation:
-    """The team, what it holds and who pushes it.
+    """The team, what it touches and who pushes it.
 
-    The torque is held over a tick, external torques and the joints' friction follow the state
-    inside it; the method is the classical Runge-Kutta one, order 4.
+    The torque is held over a tick; external torques and friction follow the state inside it. The
+    method is the classical Runge-Kutta one, order 4.
 
     Args:
-        team: The robots.
+        plant: The team with all passive bodies and couplings.
         rate: Ticks per second [Hz].
-        held: Object that the team holds, or None.
+        held: Object at subtask level that the team holds, or None.
         pushes: Pushes of the scenario.
 
     Attributes:
         tick: Number of ticks since the start; time is tick / rate.
-        q: Configuration, shape (nq,).
-        v: Velocity, shape (n,).
         torque: Control torque of the last tick, shape (n,).
     """
 
     def __init__(
         self,
-        team: Team,
+        plant: Plant,
         rate: float,
         held: SubtaskObject | None = None,
         pushes: Sequence[ScheduledPush] = (),
     ) -> None:
-        self.team, self.rate = team, rate
+        self.plant, self.team, self.rate = plant, plant.team, rate
         self._held, self._pushes = held, tuple(pushes)
         self._live: dict[str, LivePush] = {}
         self.tick = 0
+        self._q: Array
+        self._v: Array
         self.reset()
 
     @property
@@ -50,10 +72,34 @@ class TeamSimulation:
         """Time since the start [s]."""
         return seconds(tick_stamp(self.tick, self.rate))
 
+    @property
+    def q(self) -> Array:
+        """Configuration of the team, shape (nq,)."""
+        return self._q[: len(self.team.q0)]
+
+    @q.setter
+    def q(self, value: Array) -> None:
+        self._q = np.concatenate([value, self._q[len(self.team.q0) :]])
+
+    @property
+    def v(self) -> Array:
+        """Velocity of the team, shape (n,)."""
+        return self._v[: self.team.n]
+
+    @v.setter
+    def v(self, value: Array) -> None:
+        self._v = np.concatenate([value, self._v[self.team.n :]])
+
+    @property
+    def plant_q(self) -> Array:
+        """Configuration of the team and of all bodies, as the plant's model has it."""
+        return self._q
+
     def reset(self) -> None:
-        """Puts the team back to its initial state, at rest; time goes on."""
-        self.q, self.v = self.team.q0.copy(), np.zeros(self.team.n)
+        """Puts everything back to its initial state, at rest; time goes on."""
+        self._q, self._v = self.plant.q0.copy(), np.zeros(self.plant.model.nv)
         self.torque = np.zeros(self.team.n)
+        self._work = np.zeros(3)
         self._live.clear()
 
     def push(self, robot: str, wrench: Array, in_tool_axes: bool, duration: float) -> None:
@@ -69,63 +115,90 @@ class TeamSimulation:
 
     def step(self, torque: Array | None) -> None:
         """One tick under a control torque, shape (n,); None brakes by damping and gravity."""
-        pushed = self._push_wrenches(self.q).any()
-        still = self._held is None and not pushed
 
         def applied(q: Array, v: Array) -> Array:
             if torque is not None:
                 return torque
             return self.team.gravity(q) - self.team.brake_damping * v
 
-        def acceleration(q: Array, v: Array) -> Array:
-            if still:
-                return self.team.forward_dynamics(q, v, self._rubbed(v, applied(q, v)))
-            return self._loaded_acceleration(q, v, applied(q, v))
+        def derivative(q: Array, v: Array) -> tuple[Array, Array]:
+            return self._derivative(q, v, applied(self._of_team(q), v[: self.team.n]))
 
         self.torque = applied(self.q, self.v)
-        integrate = self.team.integrate
-        self.q, self.v = runge_kutta_step(integrate, acceleration, self.q, self.v, 1 / self.rate)
+        step = 1.0 / self.rate
+        self._q, self._v, work = runge_kutta_step(self.plant, derivative, self._q, self._v, step)
+        self._work += work
         self.tick += 1
-        self._live = {name: push for name, push in self._live.items() if push.until > self.now}
+        if self._live:
+            self._live = {name: push for name, push in self._live.items() if push.until > self.now}
 
-    def _rubbed(self, v: Array, torque: Array) -> Array:
-        """What viscous friction leaves of a torque, shape (n,) [N or N m]."""
-        return torque - self.team.friction * v
+    def _of_team(self, q: Array) -> Array:
+        return q[: len(self.team.q0)]
 
-    def _push_wrenches(self, q: Array) -> Array:
-        """Pushes on each tool of a team at q now, world axes, shape (N, 6) [N, N m]."""
+    def _derivative(self, q: Array, v: Array, torque: Array) -> tuple[Array, Array]:
+        """Acceleration of the plant, and the powers of controls, pushes and losses."""
+        n = self.team.n
+        effects = self.plant.effects(q, v)
+        load = self.plant.coupling_torque(q, effects) - self.plant.friction * v
+        load[:n] += torque
+        lost = float(v @ (self.plant.friction * v)) + sum(item.dissipated for item in effects)
+        outside = 0.0
+        if self._pushed():
+            state = self.team.state(self._of_team(q), v[:n])
+            pushing = self.team.external_torque(state, self._push_wrenches(state.tool_rotations))
+            load[:n] += pushing
+            outside = float(pushing @ v[:n])
+        if self._held is None:
+            acceleration = self.plant.acceleration(q, v, load)
+        else:
+            acceleration, holding = self._held.accelerate(
+                self.team.state(self._of_team(q), v[:n]), load
+            )
+            outside += float(holding @ v[:n])
+        return acceleration, np.array([float(torque @ v[:n]), outside, lost])
+
+    def _pushed(self) -> bool:
+        return bool(self._live) or any(push.wrench(self.now).any() for push in self._pushes)
+
+    def _push_wrenches(self, rotations: Array) -> Array:
+        """Pushes on each tool now, world axes, shape (N, 6) [N, N m].
+
+        Args:
+            rotations: Tool orientations, shape (N, 3, 3).
+        """
         wrenches = np.zeros((len(self.team.names), 6))
         for push in self._pushes:
             wrenches[self.team.index(push.robot)] += push.wrench(self.now)
-        if self._live:
-            rotations = self.team.tool_rotations(q)
         for name, live in self._live.items():
             i = self.team.index(name)
             R = rotations[i] if live.in_tool_axes else np.eye(3)
             wrenches[i] += np.concatenate([R @ live.wrench[:3], R @ live.wrench[3:]])
         return wrenches
 
-    def _loaded_acceleration(self, q: Array, v: Array, torque: Array) -> Array:
-        """Acceleration with everything that acts from outside; the object's mass is implicit."""
-        pushes = self._push_wrenches(q)
-        state = self.team.state(q, v)
-        load = self._rubbed(v, torque) - state.C @ v - state.g
-        total = load + self.team.external_torque(state, pushes)
-        if self._held is None:
-            return np.linalg.solve(state.M, total)
-        A, b = self._held.torque_terms(state)
-        return np.linalg.solve(state.M - A, total + b)
-
     def external_wrenches(self) -> Array:
         """What acts on each tool from outside, under the last control torque, shape (N, 6).
 
-        World axes, at the tool point [N, N m]. What the object exerts is reported as the smallest
-        wrench on each tool that has its joint torque.
+        World axes, at the tool point [N, N m]. What an object at subtask level exerts is reported
+        as the smallest wrench on each tool that has its joint torque.
         """
-        wrenches = self._push_wrenches(self.q)
-        if self._held is None:
-            return wrenches
-        state = self.team.state(self.q, self.v)
-        acceleration = self._loaded_acceleration(self.q, self.v, self.torque)
-        A, b = self._held.torque_terms(state)
-        return wrenches + self.team.tool_wrenches(state, A @ acceleration + b)
+        wrenches = self.plant.tool_wrenches(self._effects())
+        if self._pushed():
+            wrenches += self._push_wrenches(self.team.tool_rotations(self.q))
+        if self._held is not None:
+            state = self.team.state(self.q, self.v)
+            load = self.torque - self.team.friction * self.v
+            if self._pushed():
+                pushes = self._push_wrenches(state.tool_rotations)
+                load = load + self.team.external_torque(state, pushes)
+            _, holding = self._held.accelerate(state, load)
+            wrenches += self.team.tool_wrenches(state, holding)
+        return wrenches
+
+    def _effects(self) -> list[Effect]:
+        return self.plant.effects(self._q, self._v)
+
+    def energy(self) -> EnergyBalance:
+        """The balance since the start or the last reset."""
+        stored = self.plant.mechanical_energy(self._q, self._v)
+        stored += sum(effect.potential for effect in self._effects())
+        return EnergyBalance(stored, *self._work.tolist())

@@ -3,6 +3,7 @@
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
+from noninteract_ros.last_call import LastCall
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.robot import AXES
 from noninteract_ros.team.team import Team, TeamState
@@ -27,12 +28,13 @@ class MixedPosition(Subtask):
         ordered = rows == list(range(rows[0], rows[0] + len(rows)))
         # A slice is a view; indices in another order need a copy.
         self._rows = slice(rows[0], rows[-1] + 1) if ordered else rows
+        self._mixed, self._mixed_rate = LastCall(self._mix), LastCall(self._mix)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
         """Value, Jacobian and Jacobian rate; the mixing is constant, so are its derivatives."""
         x = self._weights @ state.tool_positions[:, self._rows]
-        J = self._mix(state.tool_jacobians)
-        return SubtaskState(x.ravel(), J, self._mix(state.tool_jacobian_rates))
+        J = self._mixed(state.tool_jacobians)
+        return SubtaskState(x.ravel(), J, self._mixed_rate(state.tool_jacobian_rates))
 
     def _mix(self, tools: Array) -> Array:
         count, _, n = tools.shape

@@ -7,6 +7,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import SubtaskError
+from noninteract_ros.last_call import LastCall
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.team import Team, TeamState
@@ -40,6 +41,7 @@ class SubtaskStack:
         self.layout = Layout.joined([subtask.layout for subtask in subtasks])
         self.slices = _slices([subtask.dim for subtask in subtasks])
         self.value_slices = _slices([subtask.size for subtask in subtasks])
+        self._stacked, self._stacked_rate = LastCall(_stack), LastCall(_stack)
         self._check_rank(team)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
@@ -47,8 +49,8 @@ class SubtaskStack:
         parts = [subtask.evaluate(state) for subtask in self.subtasks]
         return SubtaskState(
             np.concatenate([part.x for part in parts]),
-            np.concatenate([part.J for part in parts]),
-            np.concatenate([part.J_rate for part in parts]),
+            self._stacked(*(part.J for part in parts)),
+            self._stacked_rate(*(part.J_rate for part in parts)),
         )
 
     def difference(self, x: Array, x_d: Array) -> Array:
@@ -92,3 +94,7 @@ class SubtaskStack:
 def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
     ends = np.cumsum(sizes).tolist()
     return tuple(slice(end - size, end) for end, size in zip(ends, sizes, strict=True))
+
+
+def _stack(*parts: Array) -> Array:
+    return np.concatenate(parts)

@@ -13,6 +13,8 @@ from noninteract_ros.team.joining import append_model
 from noninteract_ros.team.joint_coordinates import JointCoordinates
 from noninteract_ros.team.robot import Robot, frame_index
 
+PRISMATIC = ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismaticUnaligned")
+
 
 @dataclass(frozen=True, slots=True)
 class TeamState:
@@ -89,6 +91,8 @@ class Team:
         self._data = self.model.createData()
         self._tools = [self._tool(robot) for robot in robots]
         self._lower = np.tri(self.n, k=-1, dtype=bool)
+        self._prismatic = all(joint.shortname() in PRISMATIC for joint in self.model.joints[1:])
+        self._constant: TeamState | None = None
 
     @staticmethod
     def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
@@ -114,7 +118,30 @@ class Team:
         return self._coordinates.difference(start, end)
 
     def state(self, q: Array, v: Array) -> TeamState:
-        """Dynamics and tool kinematics at (q, v); the arrays are new at each call."""
+        """Dynamics and tool kinematics at (q, v); nobody may write into the arrays.
+
+        On a team of prismatic joints all terms but the tool points are constant, and the same
+        arrays are handed out at every call.
+        """
+        if not self._prismatic:
+            return self._state(q, v)
+        if self._constant is None:
+            self._constant = self._state(np.zeros_like(q), np.zeros(self.n))
+        known = self._constant
+        positions = known.tool_positions + known.tool_jacobians[:, :3] @ q
+        return TeamState(
+            q,
+            v,
+            known.M,
+            known.C,
+            known.g,
+            positions,
+            known.tool_jacobians,
+            known.tool_jacobian_rates,
+            known.tool_rotations,
+        )
+
+    def _state(self, q: Array, v: Array) -> TeamState:
         model, data = self.model, self._data
         pin.computeAllTerms(model, data, q, v)
         pin.computeJointJacobiansTimeVariation(model, data, q, v)

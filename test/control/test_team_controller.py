@@ -14,6 +14,7 @@ from noninteract_ros.control.reference import Reference
 from noninteract_ros.control.subtask_input import InputSettings
 from noninteract_ros.control.team_controller import JUMP, TeamController, Tick
 from noninteract_ros.errors import ScenarioError
+from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.team_simulation import TeamSimulation
 from noninteract_ros.subtasks.cooperative_position import CooperativePosition
 from noninteract_ros.subtasks.relative_position import RelativePosition
@@ -49,7 +50,7 @@ class Loop:
         inputs = [InputSettings("human", takeover=takeover), InputSettings("autonomy")]
         stack = SubtaskStack(self.team, subtasks)
         self.controller = TeamController(self.team, stack, law, [SOFT, RELATIVE], inputs, **keys)
-        self.simulation = TeamSimulation(self.team, 1.0 / STEP)
+        self.simulation = TeamSimulation(Plant(self.team), 1.0 / STEP)
 
     @property
     def now(self) -> float:

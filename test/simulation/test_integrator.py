@@ -7,11 +7,21 @@ import pytest
 from noninteract_ros.simulation.integrator import runge_kutta_step
 
 
+class Line:
+    """Numbers, where a tangent vector is a difference."""
+
+    def integrate(self, q, step):
+        return q + step
+
+    def chart_velocity(self, q_0, q, v):
+        return v
+
+
 def swing(steps: int) -> float:
     """Error of the state of an oscillator after one second in a number of steps."""
     q, v = np.array([1.0]), np.array([0.0])
     for _ in range(steps):
-        q, v = runge_kutta_step(np.add, lambda q, v: -9.0 * q, q, v, 1.0 / steps)
+        q, v, _ = runge_kutta_step(Line(), lambda q, v: (-9.0 * q, np.zeros(0)), q, v, 1.0 / steps)
     return float(np.hypot(q[0] - np.cos(3.0), (v[0] + 3.0 * np.sin(3.0)) / 3.0))
 
 
@@ -23,5 +33,8 @@ def test_error_falls_with_the_fourth_power_of_the_step():
 def test_constant_acceleration_is_exact():
     """A fall is exact in one step."""
     fall = np.array([-9.81])
-    q, v = runge_kutta_step(np.add, lambda q, v: fall, np.array([1.0]), np.array([2.0]), 0.5)
+    q, v, work = runge_kutta_step(
+        Line(), lambda q, v: (fall, fall * v), np.array([1.0]), np.array([2.0]), 0.5
+    )
     np.testing.assert_allclose([q[0], v[0]], [1.0 + 1.0 - 0.5 * 9.81 * 0.25, 2.0 - 9.81 * 0.5])
+    np.testing.assert_allclose(work, 0.5 * (v**2 - 4.0))

@@ -6,6 +6,7 @@ import pytest
 from planar_arms import PlanarArms
 from scipy.integrate import solve_ivp
 
+from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.push import ScheduledPush
 from noninteract_ros.simulation.team_simulation import TeamSimulation
 from noninteract_ros.team.point_mass import PointMass
@@ -18,12 +19,12 @@ DURATION = 0.5
 
 
 def arms(rate: float, pushes=()) -> TeamSimulation:
-    return TeamSimulation(Team(ARMS.robots(), (0.0, -9.81, 0.0)), rate, None, pushes)
+    return TeamSimulation(Plant(Team(ARMS.robots(), (0.0, -9.81, 0.0))), rate, None, pushes)
 
 
 def masses(rate: float = 100.0, pushes=()) -> TeamSimulation:
     robots = [PointMass(2.0, brake_damping=4.0).build("a"), PointMass(5.0).build("b")]
-    return TeamSimulation(Team(robots), rate, None, pushes)
+    return TeamSimulation(Plant(Team(robots)), rate, None, pushes)
 
 
 def exact(in_tool_axes: bool) -> np.ndarray:
