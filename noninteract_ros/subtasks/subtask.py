@@ -7,6 +7,7 @@ from functools import cached_property
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.parts import Part
 from noninteract_ros.team.team import TeamState
 
 
@@ -36,6 +37,8 @@ class Subtask(ABC):
         elements: Names of the bodies or edges that its messages list, in order.
         axes: Axes, out of x, y and z, that each element has.
         rotates: Whether each element has a rotation.
+        frame: Orientation of the team that other subtasks can be seen from, or None; its
+            `evaluate` returns one rotation with its differentials, see `parts.Rows`.
         dim: Number of coordinates p of a velocity.
         size: Number of numbers of a value.
     """
@@ -44,6 +47,7 @@ class Subtask(ABC):
     elements: tuple[str, ...]
     axes: tuple[str, ...]
     rotates: bool = False
+    frame: Part | None = None
 
     @cached_property
     def layout(self) -> Layout:

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parts of subtasks: positions or rotations of elements, with their differentials."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.team.team import TeamState
+
+
+@dataclass(frozen=True, slots=True)
+class Rows:
+    """Positions or rotations of all elements, with their differentials.
+
+    Attributes:
+        value: Positions, shape (elements, k), or rotation matrices, shape (elements, 3, 3).
+        J: Jacobians, of rotations those of the angular velocity, shape (elements, k, n).
+        J_rate: Their time derivatives, shape (elements, k, n).
+    """
+
+    value: Array
+    J: Array
+    J_rate: Array
+
+
+class Part(Protocol):
+    """Something that gives positions along x, y, z, or rotations."""
+
+    def evaluate(self, state: TeamState) -> Rows:
+        """Values and differentials at a state of the team."""
+
+
+class MixedPoints:
+    """Sums of the tool points with constant weights, in the world.
+
+    Args:
+        weights: Weight of each robot in each element, shape (elements, N).
+    """
+
+    def __init__(self, weights: Array) -> None:
+        self._weights = weights
+
+    def evaluate(self, state: TeamState) -> Rows:
+        """Values and differentials along x, y, z; the mixing is constant."""
+        count, _, n = state.tool_jacobians.shape
+        linear = state.tool_jacobians[:, :3].reshape(count, -1)
+        linear_rate = state.tool_jacobian_rates[:, :3].reshape(count, -1)
+        return Rows(
+            self._weights @ state.tool_positions,
+            (self._weights @ linear).reshape(-1, 3, n),
+            (self._weights @ linear_rate).reshape(-1, 3, n),
+        )
