@@ -16,19 +16,20 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds
-from noninteract_ros.control.inputs import SOURCES, Force, Motion, Rate, Target
+from noninteract_ros.control.inputs import HORIZON, SOURCES, Force, Motion, Rate, Target
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.controller_parameters import LiveParameters
-from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder
+from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder, state_lead
 from noninteract_ros.nodes.messages import Level, Marker, ParsedReference, SubtaskCodec
 from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 from noninteract_ros.nodes.telemetry import Telemetry
 
 WATCH_PERIOD = 0.1  # [s] how often absent lockstep sources are looked for
+WAIT_SHOWN = 0.3  # [s] of waiting for something that is worth a word
 
 
 class Controller(ScenarioNode):
@@ -51,7 +52,8 @@ class Controller(ScenarioNode):
         self._queue: deque[Callable[[], None]] = deque()
         self._state: tuple[int, Array, Array] | None = None
         self._state_at = self._waiting_since = -np.inf
-        self._order = StampOrder()
+        self._order, self._lead = StampOrder(), state_lead(general.rate)
+        self._missing: list[str] = []
         self._answered: tuple[int, bytes] | None = None
         self._now = 0.0
         self._cycle_times: deque[float] = deque(maxlen=1000)
@@ -127,28 +129,40 @@ class Controller(ScenarioNode):
         self, topic: str, subtask: str, source: str, parsed: tuple[int, Motion | Force | None]
     ) -> None:
         """Hands an input to the core, or notes that a source has none."""
+        if not self._team_is_there():
+            return  # Its time is not known; in lockstep sources say again what is needed.
         stamp, item = parsed
         heard = self.core.inputs[subtask].sources[source]
         when = seconds(stamp)
+        if item is None:
+            heard.silent_until(when)
+            return
+        if self.lockstep and self._now <= when < seconds(self._order.last(topic)):
+            return  # A source that saw the state again says again what it has said.
+        # Without a stamp, or by another clock than the team's, an input holds from now on.
+        at_once = stamp == 0 or not self.lockstep
         try:
-            if item is None:
-                heard.silent_until(when)
-                return
-            self._order.check(topic, stamp)
-            # Without a stamp, or by another clock than the team's, an input holds from now on.
-            at_once = stamp == 0 or not self.lockstep
+            if stamp:
+                self._order.check(topic, stamp, float("inf") if self.lockstep else HORIZON)
             heard.receive(self._now if at_once else when, item, self._now)
         except InputError as error:
             self.refuse(topic, str(error))
+            return
+        if stamp:
+            self._order.note(topic, stamp)
+
+    def _team_is_there(self) -> bool:
+        age = time.monotonic() - self._state_at
+        fresh = self.lockstep or age <= self.scenario.general.state_timeout
+        return self._state is not None and fresh
 
     def _on_state(self, data: bytes) -> None:
         stamp, positions, v, _ = self._joints.decode(data)
         assert positions is not None  # The codec requires both.
         assert v is not None
         q = self.core.team.configuration_from_joints(positions)
-        if self._order.check("joint_states", stamp):
-            self._answered = None
-            self._post(self.core.reset)
+        if self._order.take("joint_states", stamp, self._lead):
+            self._begin_anew(stamp)
         self._state_at = time.monotonic()
         if self._answered is not None and stamp == self._answered[0]:
             if self.lockstep:  # The team has not seen the answer.
@@ -160,13 +174,23 @@ class Controller(ScenarioNode):
         if self.lockstep:
             self._answer_if_complete()
 
+    def _begin_anew(self, stamp: int) -> None:
+        """The team was started anew: what was heard belongs to its former life."""
+        self._state = self._answered = None
+        self._order.forget()
+        self._order.note("joint_states", stamp)
+        self._telemetry.forget()
+        self._post(self.core.reset)
+
     def _answer_if_complete(self) -> None:
         """Lockstep: answers the state once all that belongs to its tick has come."""
         if self._state is None or (self._answered and self._answered[0] == self._state[0]):
             return
         self._now = seconds(self._state[0])
-        missing = self._watch.missing(self._now, self._waiting_since)
-        if not missing and self._telemetry.complete(self._state[0]):
+        self._missing = self._watch.missing(self._now, self._waiting_since)
+        if not self._missing:
+            self._missing = self._telemetry.missing(self._state[0])
+        if not self._missing:
             self._answer(*self._state)
 
     def _answer(self, stamp: int, q: Array, v: Array) -> None:
@@ -197,8 +221,9 @@ class Controller(ScenarioNode):
         ticker = Ticker(self.scenario.general.rate)
         while self.context.ok():
             ticker.wait()
-            state = self._state
-            if state is None or (self._answered and self._answered[0] == state[0]):
+            state, answered = self._state, self._answered
+            if state is None or (answered and answered[0] == state[0]):
+                self._work_off()
                 continue
             self._now = seconds(state[0])
             self._work_off()
@@ -236,6 +261,8 @@ class Controller(ScenarioNode):
             return Level.ERROR, "holding: no states of the team", values
         if mode.stopped:
             return Level.WARN, "stopped", values
+        if self._missing and time.monotonic() - self._waiting_since > WAIT_SHOWN:
+            return Level.WARN, f"waiting for {', '.join(self._missing)}", values
         if self._watch.absent:
             return Level.WARN, f"running without {', '.join(sorted(self._watch.absent))}", values
         silent_ones = [name for name, is_silent in self._silent.items() if is_silent]

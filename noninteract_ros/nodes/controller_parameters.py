@@ -50,8 +50,7 @@ class LiveParameters:
             if settings != self._impedances[name]:
                 changes.append(partial(self._core.set_impedance, name, settings))
         self._impedances = impedances
-        for change in changes:
-            self._post(change)
+        self._post(partial(_run_all, changes))
         return SetParametersResult(successful=True)
 
     def _plan(
@@ -70,3 +69,9 @@ class LiveParameters:
             changes.append(partial(self._core.set_authority, subtask, checked))
         else:
             impedances[subtask] = replace(impedances[subtask], **{item: checked})
+
+
+def _run_all(changes: list[Callable[[], None]]) -> None:
+    """Changes that were asked for together begin at the same tick."""
+    for change in changes:
+        change()

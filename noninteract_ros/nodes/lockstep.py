@@ -5,6 +5,7 @@ import time
 from collections.abc import Mapping, Sequence
 
 from noninteract_ros.clock import seconds
+from noninteract_ros.control.inputs import HORIZON
 from noninteract_ros.control.subtask_input import SubtaskInput
 from noninteract_ros.errors import InputError
 
@@ -53,27 +54,58 @@ class SourceWatch:
 
 
 class StampOrder:
-    """Refuses stamps that go back, topic by topic; a topic that was silent may start anew."""
+    """Refuses stamps that go back or run ahead, topic by topic; after a silence all may be new."""
 
     def __init__(self) -> None:
         self._last: dict[str, tuple[int, float]] = {}
 
-    def check(self, topic: str, stamp: int) -> bool:
-        """Notes a stamp [ns]; zero is no stamp.
+    def last(self, topic: str) -> int:
+        """Newest stamp that was taken on a topic [ns]; -1, if none was."""
+        return self._last.get(topic, (-1, 0.0))[0]
+
+    def check(self, topic: str, stamp: int, lead: float = float("inf")) -> bool:
+        """Compares a stamp [ns] with the one before it.
+
+        Args:
+            topic: Where it came.
+            stamp: The stamp [ns].
+            lead: By how much more than wall time it may have grown [s].
 
         Returns:
-            Whether the topic started anew with an earlier stamp.
+            Whether the topic starts anew with an earlier stamp.
 
         Raises:
-            InputError: The stamp goes back without a silence before it.
+            InputError: The stamp goes back or runs ahead, without a silence before it.
         """
-        if stamp == 0 and topic != "joint_states":
+        if topic not in self._last:
             return False
-        now = time.monotonic()
-        last, at = self._last.get(topic, (stamp, now))
-        if stamp < last and now - at < RESTART_SILENCE:
-            raise InputError(
-                f"stamp goes back: {seconds(stamp):.6f} s after {seconds(last):.6f} s"
-            )
-        self._last[topic] = (stamp, now)
-        return stamp < last
+        last, at = self._last[topic]
+        silence = time.monotonic() - at
+        if silence >= RESTART_SILENCE:
+            return stamp < last
+        if stamp < last:
+            text = f"stamp goes back: {seconds(stamp):.6f} s after {seconds(last):.6f} s"
+            raise InputError(text)
+        if seconds(stamp - last) > silence + lead:
+            text = f"stamp runs ahead: {seconds(stamp):.6f} s after {seconds(last):.6f} s"
+            raise InputError(text)
+        return False
+
+    def note(self, topic: str, stamp: int) -> None:
+        """Keeps the stamp [ns] of a message that was taken."""
+        self._last[topic] = (stamp, time.monotonic())
+
+    def take(self, topic: str, stamp: int, lead: float = float("inf")) -> bool:
+        """Checks and keeps a stamp; see `check`."""
+        anew = self.check(topic, stamp, lead)
+        self.note(topic, stamp)
+        return anew
+
+    def forget(self) -> None:
+        """Starts anew on every topic."""
+        self._last.clear()
+
+
+def state_lead(rate: float) -> float:
+    """By how much the stamps of a team with this rate [Hz] may run ahead of wall time [s]."""
+    return max(HORIZON, 2.0 / rate)

@@ -14,9 +14,12 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool, Trigger
 
-from noninteract_ros.clock import tick_stamp
+from noninteract_ros.clock import seconds, tick_stamp
+from noninteract_ros.control.inputs import HORIZON
+from noninteract_ros.errors import InputError
 from noninteract_ros.nodes import messages
 from noninteract_ros.nodes.cdr import JointStateCodec
+from noninteract_ros.nodes.lockstep import StampOrder
 from noninteract_ros.nodes.messages import Level
 from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
@@ -43,7 +46,8 @@ class RobotTeam(ScenarioNode):
         self._telemetry = max(1, round(general.rate / general.telemetry_rate))
         self._lock = threading.Lock()
         self._paused = general.start_paused
-        self._stamp = 0
+        self._stamp = self._stamp_before = 0
+        self._order = StampOrder()
         self._sent_at = 0.0
         self._command: tuple[int, np.ndarray] | None = None
         self._command_at = -np.inf
@@ -73,17 +77,37 @@ class RobotTeam(ScenarioNode):
         stamp, _, _, effort = self._commands.decode(data)
         assert effort is not None  # The codec requires it.
         with self._lock:
-            if self.lockstep and stamp != self._stamp:
+            if self.lockstep and stamp == self._stamp_before != self._stamp:
                 return  # A second answer to a state that was sent twice.
+            self._check_command(stamp)
             self._command, self._command_at = (stamp, effort), time.monotonic()
             if self.lockstep and not self._paused:
                 self._advance(effort)
 
+    def _check_command(self, stamp: int) -> None:
+        """Refuses a command for a state that was not sent, or for one that is past."""
+        if stamp > self._stamp or (self.lockstep and stamp != self._stamp):
+            text = f"the last state is of {seconds(self._stamp):.6f} s"
+            raise InputError(f"stamp {seconds(stamp):.6f} s answers no state: {text}")
+        self._order.take("joint_commands", stamp)
+
     def _on_push(self, robot: str, tool_frame: str, message: WrenchStamped) -> None:
-        _, axes, wrench = messages.push(message, tool_frame)
+        stamp, axes, wrench = messages.push(message, tool_frame)
+        if stamp:
+            self._check_push(robot, stamp)
         timeout = self.scenario.general.push_timeout
         with self._lock:
             self._simulation.push(robot, wrench, axes == "tool", timeout)
+
+    def _check_push(self, robot: str, stamp: int) -> None:
+        """Refuses a push with a stamp that goes back, or is ahead of the team's time."""
+        if not self.lockstep:
+            self._order.take(robot, stamp, HORIZON)
+        elif stamp > self._stamp + 1e9 * HORIZON:
+            text = f"is ahead of the team's time {seconds(self._stamp):.6f} s"
+            raise InputError(f"stamp {seconds(stamp):.6f} s {text}")
+        else:
+            self._order.take(robot, stamp)
 
     def _advance(self, torque: np.ndarray | None) -> None:
         """One tick, then the state that follows."""
@@ -99,9 +123,11 @@ class RobotTeam(ScenarioNode):
     def _publish(self) -> None:
         simulation = self._simulation
         if self.lockstep:
-            self._stamp = tick_stamp(simulation.tick, simulation.rate)
+            stamp = tick_stamp(simulation.tick, simulation.rate)
         else:
-            self._stamp = self.get_clock().now().nanoseconds
+            stamp = self.get_clock().now().nanoseconds
+        if stamp != self._stamp:
+            self._stamp_before, self._stamp = self._stamp, stamp
         self._sent_at = time.monotonic()
         if self._clock_to is not None:
             now = messages.to_stamp(tick_stamp(simulation.tick, simulation.rate))
@@ -133,9 +159,10 @@ class RobotTeam(ScenarioNode):
             ticker.wait()
             with self._lock:
                 fresh = time.monotonic() - self._command_at <= timeout
-                self._braking = not fresh
+                command = self._command if fresh else None
+                self._braking = command is None
                 if not self._paused:
-                    self._advance(self._command[1] if fresh and self._command else None)
+                    self._advance(command[1] if command else None)
 
     def _guarded(self, action: Callable[[], tuple[bool, str]]) -> Callable[[Any, Any], Any]:
         def serve(_: Any, response: Any) -> Any:

@@ -11,8 +11,9 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
 from noninteract_ros.control.reference import Reference
+from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.cdr import JointStateCodec
-from noninteract_ros.nodes.lockstep import StampOrder
+from noninteract_ros.nodes.lockstep import StampOrder, state_lead
 from noninteract_ros.nodes.messages import Level, SubtaskCodec
 from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.operator.narrator import Narrator, Sampler
@@ -45,14 +46,13 @@ class SourceNode(ScenarioNode):
         self._joints = JointStateCodec(team.joint_names)
         self._rate, self._update_rate = self.scenario.general.rate, update_rate
         self._narrator = Narrator(sampler, self._rate)
-        self._order = StampOrder()
+        self._order, self._lead = StampOrder(), state_lead(self._rate)
         self._began: int | None = None
         self._stamp = -1
         self._state_at = -np.inf
         self._feedback: Array = np.zeros(task.dim)
         self._sent = 0
-        self._last_words: list[bytes] = []
-        self._listeners = 0
+        self._words: list[tuple[int, bytes]] = []
         topic = f"{subtask}/{source}/reference"
         self._publish_to = self.create_publisher(MultiDOFJointTrajectory, topic, LOOP_QOS)
         self.subscribe(JointState, "joint_states", self._on_state, raw=True)
@@ -61,13 +61,13 @@ class SourceNode(ScenarioNode):
 
     def _on_state(self, data: bytes) -> None:
         stamp = self._joints.decode(data).stamp_ns
-        if self._order.check("joint_states", stamp):
-            self._began = None
+        if self._order.take("joint_states", stamp, self._lead):
+            self._begin_anew(stamp)
         self._state_at = time.monotonic()
         if stamp == self._stamp and self._began is not None:
             self._repeat()
             return
-        self._last_words = []
+        self._words = [(until, words) for until, words in self._words if until >= stamp]
         if self._began is None:
             self._began = stamp
             self._narrator.begin(seconds(stamp))
@@ -77,8 +77,19 @@ class SourceNode(ScenarioNode):
         if self.lockstep and not self._feels:
             self._speak_ahead(stamp)
 
+    def _begin_anew(self, stamp: int) -> None:
+        """The team was started anew: what was felt and said belongs to its former life."""
+        self._order.forget()
+        self._order.note("joint_states", stamp)
+        self._began = None
+        self._words = []
+        self._feedback = np.zeros_like(self._feedback)
+
     def _on_feedback(self, message: WrenchStamped) -> None:
         stamp, force = self._codec.force(message)
+        if self.lockstep and stamp > self._stamp + 2e9 / self._rate:
+            raise InputError(f"stamp {seconds(stamp):.6f} s answers no state of the team")
+        self._order.take("feedback", stamp, self._lead)
         self._feedback = force
         if self.lockstep and self._began is not None:
             self._speak_ahead(stamp)
@@ -94,17 +105,18 @@ class SourceNode(ScenarioNode):
                 words = self._codec.encode_marker(stamp)
             else:
                 words = self._encode(stamp, reference)
-            self._last_words.append(words)
+            self._words.append((stamp, words))
             self._publish_to.publish(words)
-        self._listeners = self._publish_to.get_subscription_count()
 
     def _repeat(self) -> None:
-        """Says it again where a state is sent again and somebody joined who cannot have heard."""
-        listeners = self._publish_to.get_subscription_count()
-        if listeners > self._listeners:
-            for words in self._last_words:
-                self._publish_to.publish(words)
-        self._listeners = listeners
+        """Says again what holds for a state that was sent again: somebody did not hear it."""
+        if not self.lockstep:
+            return
+        if not self._words:  # A hand has waited for a feedback that never came.
+            self._speak(seconds(self._stamp))
+            return
+        for _, words in self._words:
+            self._publish_to.publish(words)
 
     def _encode(self, stamp: int, reference: Reference) -> bytes:
         self._sent += 1
@@ -118,11 +130,12 @@ class SourceNode(ScenarioNode):
         timeout = self.scenario.general.state_timeout
         while self.context.ok():
             ticker.wait()
-            if self._began is None or time.monotonic() - self._state_at > timeout:
+            began = self._began
+            if began is None or time.monotonic() - self._state_at > timeout:
                 continue
             now = self.get_clock().now().nanoseconds
             feedback = self._feedback if self._feels else None
-            reference = self._sampler.sample(seconds(now - self._began), feedback)
+            reference = self._sampler.sample(seconds(now - began), feedback)
             if reference is not None:
                 self._publish_to.publish(self._encode(now, reference))
 

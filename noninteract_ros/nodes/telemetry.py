@@ -10,6 +10,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.clock import seconds
 from noninteract_ros.control.team_controller import TeamController, Tick
+from noninteract_ros.nodes.lockstep import StampOrder, state_lead
 from noninteract_ros.nodes.messages import EnergyCodec, SubtaskCodec, external_wrench
 from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.subtasks.stack import SubtaskStack
@@ -36,6 +37,7 @@ class Telemetry:
         self._answered = 0
         self._tick: Tick | None = None
         self._wrenches = np.zeros((len(team.names), 6))
+        self._order, self._lead = StampOrder(), state_lead(general.rate)
         self._wrench_stamps = dict.fromkeys(general.force_sensors, -1)
         for name in general.force_sensors:
             take = partial(self._on_wrench, name)
@@ -59,14 +61,22 @@ class Telemetry:
 
     def _on_wrench(self, robot: str, message: WrenchStamped) -> None:
         stamp, wrench = external_wrench(message)
+        self._order.take(robot, stamp, self._lead)
         self._wrenches[self._team.index(robot)] = wrench
         self._wrench_stamps[robot] = stamp
 
-    def complete(self, stamp: int) -> bool:
-        """Whether the wrenches that belong to the tick with this stamp [ns] have come."""
+    def forget(self) -> None:
+        """Forgets the wrenches that have come so far."""
+        self._order.forget()
+        self._wrench_stamps = dict.fromkeys(self._wrench_stamps, -1)
+
+    def missing(self, stamp: int) -> list[str]:
+        """Wrenches that belong to the tick with this stamp [ns] and have not come yet."""
         tick = round(seconds(stamp) * self._rate)
-        due = tick % self._period == 0
-        return not due or all(heard >= stamp for heard in self._wrench_stamps.values())
+        if tick % self._period:
+            return []
+        stamps = self._wrench_stamps.items()
+        return [f"{name}/external_wrench" for name, heard in stamps if heard < stamp]
 
     def publish(self, stamp: int, core: TeamController, tick: Tick) -> None:
         """Tells of a tick, stamped as the state that it answered [ns]."""

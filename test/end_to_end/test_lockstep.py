@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The programs in lockstep: the same numbers on every run, and those of the rehearsal."""
+
+import numpy as np
+import pytest
+from harness import Programs, Ros, go, paper, until
+
+from noninteract_ros.nodes.cdr import JointStateCodec
+from noninteract_ros.rehearsal import rehearse
+from noninteract_ros.scenario import Scenario
+
+NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
+TICKS = 1000
+
+
+@pytest.mark.parametrize("run", [1, 2])
+def test_every_run_is_the_rehearsal(ros: Ros, programs: Programs, run: int) -> None:
+    """States and commands of four processes are the rehearsal's to the bit, so all runs agree."""
+    values = paper(start_paused=True, end_time=TICKS / 1000, haptic={"start_time": 0.2})
+    ear = ros.ear(values)
+    programs.start_all(NAMES, values, ear)
+    go(ros)
+    until(ear.says("robot_team", "finished"), "the end of the run")
+    until(lambda: len(ear.commands) > TICKS, "the command that answers the last state")
+    scenario = Scenario.from_dict(values)
+    expected = rehearse(scenario, (TICKS + 1) / 1000)
+    codec = JointStateCodec(scenario.build_team().joint_names)
+    applied = np.vstack([np.zeros_like(expected.torque[0]), expected.torque[:-1]])
+    for tick in range(TICKS + 1):
+        stamp = 10**6 * tick
+        state = codec.encode(stamp, expected.q[tick], expected.v[tick], applied[tick])
+        assert ear.states.pop(stamp) == state, f"state {tick}"
+        command = codec.encode(stamp, effort=expected.torque[tick])
+        assert ear.commands.pop(stamp) == command, f"command {tick}"
+    assert not ear.states
+    assert not ear.commands
+
+
+def test_a_hand_that_feels_is_waited_for(ros: Ros) -> None:
+    """With feedback in the loop, device and controller take turns as in the rehearsal."""
+    values = paper(haptic={"hand_mass": 0.5}, end_time=0.3)
+    stack = ros.stack(values).begin()
+    until(stack.ear.says("robot_team", "finished"), "the end of the run")
+    expected = rehearse(Scenario.from_dict(stack.values), 0.3)
+    _, q, _, effort = stack.ear.history(stack.ear.states)
+    np.testing.assert_array_equal(q[:-1], expected.q)
+    np.testing.assert_array_equal(effort[1:], expected.torque)
+    rigid = rehearse(Scenario.from_dict(paper()), 0.3)
+    assert np.abs(expected.desired - rigid.desired).max() > 1e-4
+
+
+def test_sources_that_are_missing_are_not_waited_for_for_long(ros: Ros) -> None:
+    """A source that is not started, or falls silent, holds the team up for a while only."""
+    values = paper(haptic=None, lockstep_sources=["relative/autonomy"], lockstep_timeout=0.3)
+    stack = ros.stack(values).begin()
+    stack.run_until(0.1)
+    ros.remove(stack.nodes.pop("relative_planner"))
+    until(stack.ear.says("controller", "running without relative/autonomy"), "its absence")
+    now = stack.ear.now
+    stack.run_until(now + 0.1)
+    ros.make("relative_planner", stack.values)
+    until(stack.ear.says("controller", "holding cooperative"), "its return")
