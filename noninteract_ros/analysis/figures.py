@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figures of the paper's Section V, drawn from a recording, and the team's paths."""
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from noninteract_ros.analysis.energy_account import Account, account
+from noninteract_ros.analysis.paths import paths_figure
+from noninteract_ros.analysis.recorded import Recorded, Tracking
+from noninteract_ros.analysis.style import COLOURS, DASHES, new_figure, save, styled
+from noninteract_ros.arrays import Array
+from noninteract_ros.errors import RecordingError
+
+FEW = 3  # elements that can be told apart in one figure by colour
+BEFORE = 0.1  # share of the time after its start that a storage function is shown before it
+
+
+def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
+    """Draws all figures that a run has data for.
+
+    Args:
+        recorded: The run.
+        folder: Where the PNG files go; it exists.
+
+    Returns:
+        The files, and why the others are missing.
+    """
+    files, missing = [], []
+    for number, name in enumerate(recorded.stack.names):
+        # The paper's Fig. 2 shows its first subtask, Fig. 3 its second.
+        prefix = f"fig{number + 2}" if number < 2 else "tracking"
+        try:
+            figure = tracking_figure(recorded, name)
+            files.append(save(figure, folder / f"{prefix}_{name}.png"))
+        except RecordingError as error:
+            missing.append(str(error))
+    try:
+        files.append(save(storage_figure(recorded), folder / "fig4_storage.png"))
+    except RecordingError as error:
+        missing.append(str(error))
+    files.append(save(paths_figure(recorded), folder / "paths.png"))
+    return files, missing
+
+
+@styled
+def tracking_figure(recorded: Recorded, subtask: str) -> Figure:
+    """Desired (dashed) and actual (solid) coordinates over time, an axis of the world a row.
+
+    Raises:
+        RecordingError: The recording lacks the subtask's state or desired value.
+    """
+    tracking, task = recorded.tracking(subtask), recorded.task(subtask)
+    shape = (len(tracking.t), len(task.elements), len(task.axes))
+    actual = tracking.actual.position.reshape(shape)
+    desired = tracking.desired.position.reshape(shape)
+    figure, rows = new_figure(1.0 + 1.45 * len(task.axes), len(task.axes))
+    for column, (axes, axis) in enumerate(zip(rows, task.axes, strict=True)):
+        draw_one = _draw_few if len(task.elements) <= FEW else _draw_many
+        draw_one(axes, tracking, actual[:, :, column], desired[:, :, column], task.elements)
+        axes.set_ylabel(f"{_quantity(subtask, task.elements)}\n{axis} [m]")
+        axes.margins(x=0.0)
+    rows[-1].set_xlabel("time [s]")
+    figure.align_ylabels(rows)
+    # Beside the curves there is no telling where room is; above the axes there always is.
+    handles, labels = rows[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=min(len(labels), 4))
+    return figure
+
+
+def _quantity(subtask: str, elements: tuple[str, ...]) -> str:
+    """What an axis shows: a distance between robots, or a position of the subtask."""
+    return "distance" if all("-" in element for element in elements) else subtask
+
+
+def _draw_few(
+    axes: Axes, tracking: Tracking, actual: Array, desired: Array, elements: tuple[str, ...]
+) -> None:
+    """A colour for each element."""
+    for number, element in enumerate(elements):
+        of = f" {element}" if len(elements) > 1 else ""
+        colour = COLOURS[number]
+        axes.plot(tracking.t, actual[:, number], color=colour, label=f"actual{of}")
+        wanted = "black" if len(elements) == 1 else colour
+        axes.plot(
+            tracking.t,
+            desired[:, number],
+            color=wanted,
+            linestyle=(0, (5, 2.5)),
+            linewidth=1.1,
+            label=f"desired{of}",
+        )
+
+
+def _draw_many(
+    axes: Axes, tracking: Tracking, actual: Array, desired: Array, elements: tuple[str, ...]
+) -> None:
+    """All elements alike; what matters is how they lie on what is desired."""
+    count = len(elements)
+    solid = axes.plot(tracking.t, actual, color=COLOURS[0], linewidth=0.6, alpha=0.7)
+    dashed = axes.plot(
+        tracking.t, desired, color="black", linewidth=0.6, linestyle=(0, (5, 4)), alpha=0.8
+    )
+    solid[0].set_label(f"actual, {count} elements")
+    dashed[0].set_label("desired")
+
+
+@styled
+def storage_figure(recorded: Recorded) -> Figure:
+    """Storage functions (up) and their rates (down), each from its subtask's start on.
+
+    Raises:
+        RecordingError: The recording lacks an energy.
+    """
+    names = recorded.stack.names
+    figure, (storages, rates) = new_figure(4.2, 2)
+    for number, name in enumerate(names):
+        t, found = _aligned(recorded, name)
+        for axes, values, symbol in (
+            (storages, found.storage, "S"),
+            (rates, found.rate, r"\dot{S}"),
+        ):
+            axes.plot(
+                t,
+                values,
+                color=COLOURS[number % len(COLOURS)],
+                linestyle=DASHES[number % len(DASHES)],
+                label=_letter(symbol, name, names),
+            )
+    storages.set_ylabel("storage [J]")
+    rates.set_ylabel("rate of storage [W]")
+    figure.align_ylabels([storages, rates])
+    rates.set_xlabel("time since the subtask's start [s]")
+    for axes in (storages, rates):
+        axes.axhline(0.0, color="black", linewidth=0.6, zorder=1)
+        axes.legend(loc="best", ncols=1 + len(names) // 5)
+    storages.set_xlim(0.0, _shown(recorded))
+    return figure
+
+
+def _aligned(recorded: Recorded, subtask: str) -> tuple[Array, Account]:
+    """An account from its subtask's start on, its time counted from there."""
+    found = account(recorded, subtask)
+    start = recorded.start(subtask)
+    since = found.t - (found.t[0] if start is None else start)
+    rows = since >= -1e-9
+    return since[rows], Account(
+        found.t[rows], found.storage[rows], found.rate[rows], found.supplied[rows], found.desired
+    )
+
+
+def _shown(recorded: Recorded) -> float:
+    """Time until every storage function has settled, with as much again to see it [s]."""
+    settled = []
+    for name in recorded.stack.names:
+        t, found = _aligned(recorded, name)
+        level = found.storage[-len(found.storage) // 4 :].max(initial=0.0)
+        above = found.storage > level + 0.02 * found.storage.max(initial=0.0)
+        settled.append(t[np.flatnonzero(above)[-1]] if above.any() else 0.0)
+        longest = t[-1] if len(t) else 0.0
+    return float(np.clip(2.0 * max(settled), min(1.0, longest), longest)) or 1.0
+
+
+def _letter(symbol: str, name: str, names: tuple[str, ...]) -> str:
+    """The paper's letter of a subtask, S_c or S_r; its name where initials clash."""
+    initials = [other[0] for other in names]
+    index = name[0] if initials.count(name[0]) == 1 else name.replace("_", r"\_")
+    letter = f"${symbol}_{{{index}}}$" if len(index) == 1 else f"${symbol}$ {name}"
+    return f"{letter} ({name})" if len(index) == 1 else letter

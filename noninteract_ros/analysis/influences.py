@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What acted on a run that its scenario does not foresee."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.clock import seconds, stamp
+from noninteract_ros.control.inputs import SOURCES
+from noninteract_ros.operator.narrator import Sampler
+
+INPUTS = ("target_pose", "target_twist", "wrench")
+
+
+@dataclass(frozen=True)
+class Influence:
+    """Something from outside.
+
+    Attributes:
+        subtask: Subtask whose input it is; empty where it acts on the team or the controller.
+        text: What it was.
+    """
+
+    subtask: str
+    text: str
+
+
+def influences(recorded: Recorded) -> list[Influence]:
+    """Inputs, pushes and changes at run time that the scenario does not hold."""
+    scenario = recorded.scenario
+    found = [
+        Influence("", f"pushes on {name}/push") for name in scenario.robots
+        if recorded.has(f"{name}/push")
+    ]  # fmt: skip
+    samplers: dict[tuple[str, str], Sampler] = {}
+    if scenario.haptic:
+        key = scenario.haptic.subtask, "human"
+        samplers[key] = scenario.build_haptic(recorded.stack)
+    if scenario.planner:
+        key = scenario.planner.subtask, "autonomy"
+        samplers[key] = scenario.build_planner(recorded.stack)
+    for subtask in scenario.subtasks:
+        for source in SOURCES:
+            prefix = f"{subtask}/{source}"
+            found += [
+                Influence(subtask, f"input on {prefix}/{kind}")
+                for kind in INPUTS
+                if recorded.has(f"{prefix}/{kind}")
+            ]
+            if recorded.has(f"{prefix}/reference"):
+                found += _unforeseen(recorded, subtask, source, samplers.get((subtask, source)))
+    return found + _changes(recorded)
+
+
+def _unforeseen(
+    recorded: Recorded, subtask: str, source: str, sampler: Sampler | None
+) -> list[Influence]:
+    """References that the scenario's own source does not give."""
+    topic = f"{subtask}/{source}/reference"
+    if sampler is None:
+        return [Influence(subtask, f"references on {topic}")]
+    series = recorded.run.trajectory(topic)
+    found = []
+    if len(recorded.run.log_times(topic)) > len(series.stamps) + len(series.markers):
+        found.append(Influence(subtask, f"more than one reference for an instant on {topic}"))
+    if not len(series.stamps):
+        return found
+    foreseen, following = set(), -0.5 / recorded.rate
+    while (following := sampler.silent_until(following)) <= seconds(stamp(series.stamps.max())):
+        foreseen.add(stamp(following))
+    stamps = np.round(series.stamps * 1e9).astype(np.int64).tolist()
+    if not foreseen.issuperset(stamps):
+        found.append(Influence(subtask, f"references at other instants on {topic}"))
+    return found
+
+
+def _changes(recorded: Recorded) -> list[Influence]:
+    """Changes of law and authority and stops, as far as the controller's diagnostics say so."""
+    if not recorded.has("diagnostics"):
+        return []
+    texts: dict[str, None] = {}
+    for status in recorded.run.diagnostics():
+        if not status["name"].endswith("controller"):
+            continue
+        values = status["values"]
+        if values.get("law", recorded.scenario.general.law) != recorded.scenario.general.law:
+            texts[f"law changed to {values['law']}"] = None
+        if status["message"] == "stopped":
+            texts["the controller was stopped"] = None
+        for name, spec in recorded.scenario.subtasks.items():
+            led_by = values.get(f"{name} led by", spec.input.authority).split(",")[0]
+            if led_by != spec.input.authority:
+                texts[f"authority over {name} changed to {led_by}"] = None
+    return [Influence("", text) for text in texts]

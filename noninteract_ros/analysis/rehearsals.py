@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Rehearsals of a recorded scenario, to compare the recording with; several at a time."""
+
+import multiprocessing
+import os
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.rehearsal import Rehearsal
+from noninteract_ros.scenario import Scenario
+
+SMALL = 6000  # ticks in all that are not worth starting processes for
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One way to run the scenario.
+
+    Attributes:
+        law: Law in force.
+        human: Whether the haptic device speaks.
+        autonomy: Whether the planner speaks.
+    """
+
+    law: str
+    human: bool = True
+    autonomy: bool = True
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joint states of a rehearsal, a row per tick.
+
+    Attributes:
+        q: Configuration, shape (ticks, nq).
+        v: Velocity, shape (ticks, n).
+    """
+
+    q: Array
+    v: Array
+
+
+def rehearse_variant(scenario: Scenario, variant: Variant, ticks: int) -> Joints:
+    """Rehearses a variant of a scenario, first state included."""
+    general = replace(scenario.general, law=variant.law)
+    rehearsal = Rehearsal(replace(scenario, general=general), variant.human, variant.autonomy)
+    q, v = [rehearsal.simulation.q], [rehearsal.simulation.v]
+    for _ in range(ticks - 1):
+        rehearsal.step()
+        q.append(rehearsal.simulation.q)
+        v.append(rehearsal.simulation.v)
+    return Joints(np.array(q), np.array(v))
+
+
+def rehearse_all(scenario: Scenario, jobs: Sequence[tuple[Variant, int]]) -> list[Joints]:
+    """Rehearses variants for so many ticks each; long ones in processes of their own."""
+    workers = min(len(jobs), os.cpu_count() or 1)
+    if workers < 2 or sum(ticks for _, ticks in jobs) < SMALL:
+        return [rehearse_variant(scenario, *job) for job in jobs]
+    # A fresh interpreter each: a fork would inherit the threads of whoever asks.
+    fresh = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=fresh) as pool:
+        running = [pool.submit(rehearse_variant, scenario, *job) for job in jobs]
+        return [item.result() for item in running]

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Metrics and figures of a run, from its recording alone."""
+
+import json
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from noninteract_ros.analysis.checks import Check
+from noninteract_ros.analysis.figures import draw
+from noninteract_ros.analysis.metrics import measure
+from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.run import Run
+from noninteract_ros.analysis.tables import tables
+from noninteract_ros.errors import RecordingError
+
+__all__ = ["Report", "tables", "write_report"]
+
+METRICS_NAME = "metrics.json"
+
+
+@dataclass(frozen=True)
+class Report:
+    """What a run showed.
+
+    Attributes:
+        metrics: Content of `metrics.json`; units are in the keys.
+        checks: What the run must show.
+        files: What was written.
+        missing: Why a figure could not be drawn, one text each.
+    """
+
+    metrics: dict[str, Any]
+    checks: tuple[Check, ...]
+    files: tuple[Path, ...]
+    missing: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether no check failed; those that do not apply do not count."""
+        return all(check.passed is not False for check in self.checks)
+
+    @property
+    def failures(self) -> tuple[Check, ...]:
+        """The checks that failed."""
+        return tuple(check for check in self.checks if check.passed is False)
+
+
+def write_report(run_path: Path, out: Path | None = None, *, other_laws: bool = True) -> Report:
+    """Measures a run and draws its figures.
+
+    Long runs are rehearsed in processes of their own: a program that calls this must be
+    importable without side effects (`if __name__ == "__main__"`).
+
+    Args:
+        run_path: Recording, or the folder that holds it as `run.mcap`.
+        out: Folder for `metrics.json` and the figures; by default the recording's own.
+        other_laws: Whether the scenario is rehearsed under other laws, to compare.
+
+    Raises:
+        RecordingError: The recording cannot be read or analysed, or the folder not be written.
+    """
+    run = Run.open(run_path)
+    recorded = Recorded(run)
+    folder = out or run.path.parent
+    findings = measure(recorded, other_laws)
+    checks = tuple(findings.checks)
+    report = Report(findings.metrics, checks, ())
+    metrics = _finite(
+        findings.metrics
+        | {"checks": [check.as_dict() for check in checks], "passed": report.passed}
+    )
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / METRICS_NAME
+        path.write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        figures, missing = draw(recorded, folder)
+    except OSError as error:
+        raise RecordingError(f"{folder}: cannot be written: {error.strerror}") from error
+    return Report(metrics, checks, (path, *figures), tuple(missing))
+
+
+def _finite(value: Any) -> Any:
+    """The same with null for numbers that are none: JSON has no word for them."""
+    if isinstance(value, dict):
+        return {str(key): _finite(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A report as tables for the terminal."""
+
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from noninteract_ros.analysis.checks import Check
+
+if TYPE_CHECKING:
+    from noninteract_ros.analysis.report import Report
+
+
+def tables(report: "Report") -> list[Table]:
+    """Checks, tracking and the comparison of laws."""
+    return [
+        checks_table(report.checks),
+        tracking_table(report.metrics),
+        *crossing_tables(report.metrics),
+    ]
+
+
+def checks_table(checks: tuple[Check, ...]) -> Table:
+    """A row for each check; what does not apply says why."""
+    table = Table("check", "found", "bound", "unit", "")
+    words = {True: "[green]passed[/]", False: "[bold red]FAILED[/]", None: "[dim]n/a[/]"}
+    for check in checks:
+        sign = ">=" if check.at_least else "<="
+        found = f"[dim]{check.reason}[/]" if check.value is None else f"{check.value:.3g}"
+        bound = f"{sign} {check.limit:.3g}"
+        table.add_row(check.name, found, bound, check.unit, words[check.passed])
+    return table
+
+
+def tracking_table(metrics: dict[str, Any]) -> Table:
+    """Errors and the closed form's deviation, a row for each subtask."""
+    columns = ("max error", "rms error", "final error", "off the closed form")
+    table = Table("subtask", *(f"{name} [m]".replace("[", r"\[") for name in columns))
+    for name, found in metrics["tracking"].items():
+        keys = ("max_error_m", "rms_error_m", "final_error_m")
+        deviation = metrics["closed_form"].get(name, {}).get("max_deviation_m")
+        numbers = [*(found.get(key) for key in keys), deviation]
+        table.add_row(name, *(_number(value) for value in numbers))
+    return table
+
+
+def crossing_tables(metrics: dict[str, Any]) -> list[Table]:
+    """How far each source moves each subtask, by law; none without sources."""
+    comparison = metrics["comparison"]
+    laws = comparison["moved_m"]
+    if not comparison["led_by"]:
+        return []
+    table = Table("moved by", "subtask", *(rf"{law} \[m]" for law in laws))
+    for source, owned in comparison["led_by"].items():
+        for subtask in metrics["run"]["subtasks"]:
+            moved = [laws[law].get(source, {}).get(subtask) for law in laws]
+            own = " (its own)" if subtask == owned else ""
+            table.add_row(source, subtask + own, *(_number(value) for value in moved))
+    return [table]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3g}"

@@ -1,0 +1,133 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the figures show, asked of the figure objects."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from rehearsed import record, scenario_values
+
+from noninteract_ros.analysis.figures import draw, storage_figure, tracking_figure
+from noninteract_ros.analysis.paths import paths_figure
+from noninteract_ros.analysis.recorded import Recorded
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    return Recorded(record(tmp_path_factory.mktemp("pair"), scenario_values(), 1.2))
+
+
+def swarm_values(count: int) -> dict:
+    values = scenario_values(object=None, force_sensors=[], haptic__update_rate=100.0, rate=100.0)
+    values["telemetry_rate"] = 50.0
+    values["robots"] = [f"robot_{i + 1}" for i in range(count)]
+    for i, name in enumerate(values["robots"]):
+        values[name] = {"mass": 1.0 + i % 3, "initial_position": [0.5 * (i % 6), 0.5 * (i // 6)]}
+    edges = [[0.5, 0.1 * (i % 2)] for i in range(count - 1)]
+    values["planner"]["pair"]["value"] = [float(x) for edge in edges for x in edge]
+    return values
+
+
+def labels(figure: Figure) -> list[tuple[str, str]]:
+    return [(axes.get_xlabel(), axes.get_ylabel()) for axes in figure.axes]
+
+
+def curves(figure: Figure) -> list[dict[str, tuple[np.ndarray, str]]]:
+    """Data and line style of the labelled lines of each axes."""
+    return [
+        {
+            str(line.get_label()): (line.get_xydata(), line.get_linestyle())
+            for line in axes.lines
+            if not str(line.get_label()).startswith("_")
+        }
+        for axes in figure.axes
+    ]
+
+
+def test_the_papers_figure_2(pair: Recorded) -> None:
+    """x up and y below over time; desired dashed, actual solid, both as recorded."""
+    figure = tracking_figure(pair, "cooperative")
+    assert labels(figure) == [("", "cooperative\nx [m]"), ("time [s]", "cooperative\ny [m]")]
+    tracking = pair.tracking("cooperative")
+    for column, found in enumerate(curves(figure)):
+        actual, solid = found["actual"]
+        desired, dashed = found["desired"]
+        assert (solid, dashed) == ("-", "--")
+        np.testing.assert_array_equal(actual[:, 1], tracking.actual.position[:, column])
+        np.testing.assert_array_equal(desired[:, 1], tracking.desired.position[:, column])
+
+
+def test_the_papers_figure_3(pair: Recorded) -> None:
+    """Distances between the robots, desired and actual."""
+    figure = tracking_figure(pair, "relative")
+    assert labels(figure) == [("", "distance\nx [m]"), ("time [s]", "distance\ny [m]")]
+    assert [sorted(found) for found in curves(figure)] == [["actual", "desired"]] * 2
+
+
+def test_the_papers_figure_4(pair: Recorded) -> None:
+    """Storage up, its rate below, each from its own subtask's start on."""
+    figure = storage_figure(pair)
+    assert [label for _, label in labels(figure)] == ["storage [J]", "rate of storage [W]"]
+    assert figure.axes[1].get_xlabel() == "time since the subtask's start [s]"
+    storages, rates = curves(figure)
+    assert list(storages) == ["$S_{c}$ (cooperative)", "$S_{r}$ (relative)"]
+    assert len(rates) == 2
+    for data, _ in storages.values():
+        assert data[0, 0] == pytest.approx(0.0, abs=1e-9)
+        assert data[0, 1] == pytest.approx(data[:, 1].max(), rel=0.01)
+
+
+def test_paths_pass_through_the_tool_points(pair: Recorded) -> None:
+    """One path a robot in the plane, to scale, with formations on it."""
+    figure = paths_figure(pair)
+    assert labels(figure) == [("x [m]", "y [m]")]
+    assert figure.axes[0].get_aspect() == 1.0
+    found = curves(figure)[0]
+    assert list(found) == ["robot_1", "robot_2"]
+    np.testing.assert_array_equal(found["robot_1"][0][0], [0.3, 0.4])
+    np.testing.assert_array_equal(found["robot_2"][0][-1], pair.q[-1, 2:])
+
+
+def test_thirty_robots_stay_legible(tmp_path: Path) -> None:
+    """Many elements share two legend entries, and each has its lines."""
+    recorded = Recorded(record(tmp_path, swarm_values(30), 1.0))
+    figure = tracking_figure(recorded, "relative")
+    assert [len(axes.lines) for axes in figure.axes] == [2 * 29] * 2
+    assert [sorted(found) for found in curves(figure)] == [["actual, 29 elements", "desired"]] * 2
+    assert not paths_figure(recorded).legends
+
+
+@pytest.mark.parametrize(("axes", "expected"), [(["z"], "time [s]"), (["x", "z"], "x [m]")])
+def test_teams_on_other_axes(tmp_path: Path, axes: list[str], expected: str) -> None:
+    """One axis is drawn over time, any two as a plane."""
+    values = scenario_values(object=None, force_sensors=[], haptic=None)
+    for name in values["robots"]:
+        values[name] = {"mass": 1.0, "axes": axes}
+    values["planner"]["pair"]["value"] = [0.5] * len(axes)
+    values["cooperative"]["authority"] = "hold"
+    recorded = Recorded(record(tmp_path, values, 0.1))
+    assert labels(paths_figure(recorded)) == [(expected, "z [m]")]
+
+
+def test_files_are_written_and_what_is_missing_is_named(pair: Recorded, tmp_path: Path) -> None:
+    """All four figures are PNGs of some size; without telemetry the reason is given."""
+    files, missing = draw(pair, tmp_path)
+    assert [file.name for file in files] == [
+        "fig2_cooperative.png",
+        "fig3_relative.png",
+        "fig4_storage.png",
+        "paths.png",
+    ]
+    assert missing == []
+    for file in files:
+        assert file.read_bytes().startswith(b"\x89PNG")
+        assert file.stat().st_size > 10_000
+
+    def bare(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
+        return arrays if topic.startswith("joint") else None
+
+    files, missing = draw(Recorded(record(tmp_path, scenario_values(), 0.2, bare)), tmp_path)
+    assert [file.name for file in files] == ["paths.png"]
+    assert len(missing) == 3
+    assert "cooperative/state is not in the recording" in missing[0]

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Each check passes on a sound run and fails on one that is broken in its respect."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from rehearsed import DIAGNOSTICS, WRENCH, Tamper, record, scenario_values
+
+from noninteract_ros.analysis.checks import Check
+from noninteract_ros.analysis.metrics import Findings, measure
+from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.recording import RunWriter
+from noninteract_ros.errors import RecordingError
+from noninteract_ros.nodes.messages import Level, to_diagnostics, to_status, to_wrench_stamped
+
+
+def findings(folder: Path, tamper: Tamper | None = None, **changes: object) -> Findings:
+    run = record(folder, scenario_values(**changes), 1.2, tamper)
+    return measure(Recorded(run), other_laws=False)
+
+
+def checks(found: Findings) -> dict[str, Check]:
+    return {check.name: check for check in found.checks}
+
+
+def test_a_sound_run_passes_everything(tmp_path: Path) -> None:
+    """Nothing is missing, the nodes add nothing, subtasks do not move each other."""
+    found = findings(tmp_path)
+    failed = [check for check in found.checks if check.passed is False]
+    assert not failed
+    unsaid = {check.name for check in found.checks if check.passed is None}
+    assert unsaid == {
+        "storage_growth.cooperative",
+        "storage_growth.relative",
+        "recorder_lost",
+    }
+    assert found.metrics["completeness"]["ticks"] == 600
+    assert found.metrics["reproduction"]["bit_equal"]
+    assert found.metrics["noninteraction"]["without_human"]["moved_m"]["cooperative"] > 0.1
+    assert found.metrics["run"]["not_in_the_scenario"] == []
+
+
+def test_tracking_is_measured_from_the_first_reference_on(tmp_path: Path) -> None:
+    """The error before the human starts does not count; that of the first reference does."""
+    tracking = findings(tmp_path).metrics["tracking"]
+    assert tracking["cooperative"]["led_from_s"] == 0.5
+    expected = np.hypot(2 * np.sin(0.79 * 0.5), 1.0)
+    assert tracking["cooperative"]["initial_error_m"] == pytest.approx(expected, rel=1e-2)
+    assert tracking["relative"]["initial_error_m"] == pytest.approx(np.hypot(0.4, 0.2))
+    assert tracking["relative"]["final_error_m"] < 0.1 * tracking["relative"]["max_error_m"]
+
+
+def lose(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
+    return None if topic == "joint_states" and 0.2 < time < 0.21 else arrays
+
+
+def lose_commands(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
+    return None if topic == "joint_commands" and 0.2 < time < 0.21 else arrays
+
+
+def nudge(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+    if topic == "joint_states" and time > 0.7:
+        arrays[0] = arrays[0] + [1e-8, 0.0, 0.0, 0.0]
+    return arrays
+
+
+def negative(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+    if topic == "relative/energy" and time > 1.0:
+        arrays[0] = arrays[0] - [0.0, 1.0, 0.0, 0.0, 0.0]
+    return arrays
+
+
+def not_a_number(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+    if topic == "joint_states" and time == 0.3:
+        arrays[0] = arrays[0] * np.nan
+    return arrays
+
+
+def pumped(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+    if topic == "relative/energy":
+        arrays[0] = arrays[0] + [0.0, 0.5 * time, 0.0, 0.0, 0.0]
+    return arrays
+
+
+@pytest.mark.parametrize(
+    ("tamper", "names"),
+    [
+        (lose, ["complete.ticks_missing", "complete.commands_without_state"]),
+        (lose_commands, ["complete.states_unanswered"]),
+        (nudge, ["reproduction", "noninteraction.human", "noninteraction.autonomy"]),
+        (negative, ["storage_positive.relative"]),
+        (not_a_number, ["complete.numbers_not_finite", "reproduction", "closed_form.relative"]),
+        (pumped, ["storage_rate.relative", "storage_passive.relative"]),
+    ],
+)
+def test_what_is_broken_fails_its_check(tmp_path: Path, tamper: Tamper, names: list[str]) -> None:
+    """Lost messages, moved states and invented energy are each found by name."""
+    found = checks(findings(tmp_path, tamper))
+    assert [name for name in names if found[name].passed is not False] == []
+
+
+def test_storage_without_disturbance_never_grows(tmp_path: Path) -> None:
+    """Without object and with still references the check applies, holds, and can fail."""
+    quiet = {"object": None, "haptic__motion": "still", "haptic__centre": [0.5, 0.2]}
+    sound = checks(findings(tmp_path, **quiet))
+    assert sound["storage_growth.relative"].passed
+    assert sound["storage_growth.cooperative"].passed
+
+    def grow(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+        if topic == "relative/energy" and time > 0.6:
+            arrays[0] = arrays[0] + [0.0, 0.5, 0.0, 0.0, 0.0]
+        return arrays
+
+    broken = checks(findings(tmp_path, grow, **quiet))
+    assert broken["storage_growth.relative"].passed is False
+
+
+def test_the_natural_law_lets_errors_cross_over(tmp_path: Path) -> None:
+    """The comparison shows it; claims that are not the natural law's do not apply to it."""
+    run = record(tmp_path, scenario_values(law="natural"), 1.2)
+    found = measure(Recorded(run))
+    by_name = checks(found)
+    for name in ("noninteraction.human", "closed_form.relative", "storage_growth.relative"):
+        assert by_name[name].passed is None
+        assert "natural" in by_name[name].reason
+    moved = found.metrics["comparison"]["moved_m"]
+    assert moved["natural"]["autonomy"]["cooperative"] > 1e-2
+    assert moved["noninteracting"]["autonomy"]["cooperative"] < 1e-12
+    assert moved["natural"]["human"]["relative"] > 1e-3
+    assert moved["noninteracting"]["human"]["relative"] < 1e-12
+
+
+def test_what_came_from_outside_is_named(tmp_path: Path) -> None:
+    """A push takes the claims away that no longer hold; they do not count as passed."""
+
+    def push(writer: RunWriter) -> None:
+        data = serialize_message(to_wrench_stamped(0, np.zeros(6)))
+        writer.add("/team/robot_1/push", WRENCH, 0, 0, data)
+
+    run = record(tmp_path, scenario_values(), 0.3, extra=push)
+    found = measure(Recorded(run), other_laws=False)
+    for name in ("reproduction", "closed_form.relative", "noninteraction.human"):
+        assert checks(found)[name].passed is None
+        assert "robot_1/push" in checks(found)[name].reason
+
+
+def test_the_other_source_may_say_what_it_likes(tmp_path: Path) -> None:
+    """A target from outside for one subtask leaves the claim about the other in force."""
+
+    def target(writer: RunWriter) -> None:
+        data = serialize_message(to_wrench_stamped(0, np.zeros(6)))
+        writer.add("/team/cooperative/human/wrench", WRENCH, 0, 0, data)
+
+    run = record(tmp_path, scenario_values(), 1.2, extra=target)
+    found = checks(measure(Recorded(run), other_laws=False))
+    assert found["reproduction"].passed is None
+    assert found["noninteraction.autonomy"].passed is None
+    assert found["noninteraction.human"].passed
+    assert found["closed_form.relative"].passed
+
+
+def test_diagnostics_are_summed_up(tmp_path: Path) -> None:
+    """The worst level, the last one, refusals, and what the recorder lost, which fails."""
+
+    def tell(writer: RunWriter) -> None:
+        said = [
+            (Level.WARN, "/team/robot_team", {"refused inputs": 2, "last refusal": "push: NaN"}),
+            (Level.OK, "/team/robot_team", {"refused inputs": 3}),
+            (Level.WARN, "/team/recorder", {"lost": 4}),
+        ]
+        for level, name, values in said:
+            message = to_diagnostics(1, [to_status(name, level, "text", values)])
+            writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(message))
+
+    run = record(tmp_path, scenario_values(), 0.1, extra=tell)
+    found = measure(Recorded(run), other_laws=False)
+    assert found.metrics["diagnostics"]["/team/robot_team"] == {
+        "worst_level": "WARN",
+        "last_level": "OK",
+        "last_message": "text",
+        "refused_inputs": 3,
+        "last_refusal": "push: NaN",
+    }
+    assert checks(found)["recorder_lost"].passed is False
+
+
+def test_a_recording_that_cannot_be_analysed_says_why(tmp_path: Path) -> None:
+    """No scenario, a wrong scenario, no joint states: one line each."""
+    for text, reason in [
+        (None, "holds no scenario"),
+        ("/**: {ros__parameters: {robots: [a]}}", "its scenario is wrong: .*required"),
+        ("rate: [", "its scenario is wrong"),
+    ]:
+        with RunWriter(tmp_path / "run.mcap", text, overwrite=True) as writer:
+            data = serialize_message(to_wrench_stamped(0, np.zeros(6)))
+            writer.add("/team/x", WRENCH, 0, 0, data)
+        from noninteract_ros.analysis.run import Run
+
+        with pytest.raises(RecordingError, match=reason):
+            Recorded(Run.open(tmp_path))
