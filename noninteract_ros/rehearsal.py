@@ -8,7 +8,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.energy import Energy
-from noninteract_ros.control.team_controller import Tick
+from noninteract_ros.control.tick import Tick
 from noninteract_ros.operator.narrator import Narrator
 from noninteract_ros.scenario import Scenario
 

@@ -89,12 +89,8 @@ def task_terms(
     slices: tuple[slice, ...],
     desired_inertias: Sequence[Array | None],
 ) -> TaskDynamics:
-    """Terms that every law shares, from the team's own.
-
-    Raises:
-        numpy.linalg.LinAlgError: J is exactly singular (assumption 3).
-    """
-    S = np.linalg.inv(J)
+    """Terms that every law shares, from the team's own."""
+    S = inverse(J)
     MS = M @ S
     inertia = S.T @ MS
     inertias = tuple(
@@ -103,6 +99,17 @@ def task_terms(
     )
     constant = tuple(desired is not None for desired in desired_inertias)
     return TaskDynamics(M, C, g, J, J_rate, S, MS, inertia, slices, inertias, constant)
+
+
+def inverse(J: Array) -> Array:
+    """J^-1, shape (n, n); of an exactly singular J that of a neighbour, with very large entries.
+
+    Who uses it near a singularity has to look at `joint_safety.regularity` first.
+    """
+    try:
+        return np.linalg.inv(J)
+    except np.linalg.LinAlgError:
+        return np.linalg.inv(J + 1e-9 * np.abs(J).max() * np.eye(len(J)))
 
 
 def commanded_acceleration(

@@ -2,7 +2,7 @@
 """The controller of a team, without ROS: states and inputs in, torques and accounts out."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,64 +11,27 @@ from noninteract_ros.control.decoupling import (
     TaskDynamics,
     TaskError,
     commanded_acceleration,
+    inverse,
     joint_acceleration,
     task_dynamics,
     task_terms,
 )
 from noninteract_ros.control.energy import Energy, energy
-from noninteract_ros.control.impedance import Impedance, ImpedanceSettings, stack_impedance
+from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
+from noninteract_ros.control.joint_safety import (
+    JointSafety,
+    SafetySettings,
+    regularity,
+)
 from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
+from noninteract_ros.control.tick import Mode, Tick
 from noninteract_ros.last_call import LastCall
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import Team, TeamState
 
+DEFAULT_SAFETY = SafetySettings()
 JUMP = 0.1  # [m or rad] a coordinate that is this much further than it can have come was put there
-
-
-@dataclass(frozen=True)
-class Mode:
-    """How the torque is made; a change is bumpless.
-
-    Attributes:
-        law: One of `decoupling.LAWS`.
-        impedance: Gains of all subtasks.
-        stopped: Damps to rest instead of following the law.
-    """
-
-    law: str
-    impedance: Impedance
-    stopped: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Tick:
-    """Everything that one step of the controller found and decided.
-
-    Attributes:
-        torque: Control torque, shape (n,) [N or N m].
-        state: Team dynamics at the state.
-        task: Actual subtask values and Jacobians.
-        x_rate: Actual subtask velocities, shape (n,) [m/s; rad/s].
-        error: Tracking state of the subtasks.
-        led: What each subtask is asked to do.
-        dynamics: Task dynamics at the state.
-        task_acceleration: Commanded task acceleration, shape (n,) [m/s^2].
-        feedback: Coupling force D e_rate + h(e) of each subtask, which an operator's device
-            feels, shape (n,) [N].
-        restarted: Why every subtask was put to rest where it is, or an empty text.
-    """
-
-    torque: Array
-    state: TeamState
-    task: SubtaskState
-    x_rate: Array
-    error: TaskError
-    led: tuple[Led, ...]
-    dynamics: TaskDynamics
-    task_acceleration: Array
-    feedback: Array
-    restarted: str
 
 
 class TeamController:
@@ -83,6 +46,7 @@ class TeamController:
         transition_time: How long a change of law or gains fades in [s].
         stop_rate: Decay rate of the velocity after a stop [1/s].
         state_timeout: Gap between states after which every subtask starts anew [s].
+        safety: Behaviour at singularities and joint limits.
     """
 
     def __init__(
@@ -95,6 +59,7 @@ class TeamController:
         transition_time: float = 0.2,
         stop_rate: float = 10.0,
         state_timeout: float = 0.2,
+        safety: SafetySettings = DEFAULT_SAFETY,
     ) -> None:
         self.team, self.stack = team, stack
         self._settings = list(impedances)
@@ -109,6 +74,8 @@ class TeamController:
         self._bump, self._bump_start = np.zeros(team.n), -np.inf
         self._last: tuple[float, Array] | None = None
         self._terms = LastCall(task_terms)
+        initial = self.stack.evaluate(team.state(team.q0, np.zeros(team.n)))
+        self._safety = JointSafety(team, safety, regularity(inverse(initial.J)))
 
     @property
     def mode(self) -> Mode:
@@ -148,6 +115,7 @@ class TeamController:
         """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
         self._last = None
         self._bump_start = -np.inf
+        self._safety.reset()
         for item in self.inputs.values():
             item.reset()
 
@@ -187,14 +155,28 @@ class TeamController:
         )
         acceleration = self._acceleration(now, state, task, error, dynamics)
         wanted = joint_acceleration(dynamics, v, acceleration)
+        wanted, law_share, regular = self._safety.blend(q, v, wanted, dynamics.S)
         torque = self.team.inverse_dynamics(q, v, wanted)
+        torque, safety = self._safety.protect(q, v, torque, state.g, step)
         self._last = (now, q)
         x_rate = error.e_rate + error.reference_velocity
         feedback = self._mode.impedance.damping * error.e_rate + self._mode.impedance.force(
             error.e
         )
         return Tick(
-            torque, state, task, x_rate, error, led, dynamics, acceleration, feedback, restarted
+            torque,
+            state,
+            task,
+            x_rate,
+            error,
+            led,
+            dynamics,
+            acceleration,
+            feedback,
+            law_share,
+            regular,
+            safety,
+            restarted,
         )
 
     def energy(self, tick: Tick, external_torque: Array) -> Energy:

@@ -9,7 +9,8 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.clock import seconds
-from noninteract_ros.control.team_controller import TeamController, Tick
+from noninteract_ros.control.team_controller import TeamController
+from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.lockstep import StampOrder, state_lead
 from noninteract_ros.nodes.messages import EnergyCodec, SubtaskCodec, external_wrench
 from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode

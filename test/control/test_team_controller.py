@@ -12,7 +12,8 @@ from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
 from noninteract_ros.control.inputs import Force, Rate, Target
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.control.subtask_input import InputSettings
-from noninteract_ros.control.team_controller import JUMP, TeamController, Tick
+from noninteract_ros.control.team_controller import JUMP, TeamController
+from noninteract_ros.control.tick import Tick
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.team_simulation import TeamSimulation

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How a controller works now, and what one step of it found."""
+
+from dataclasses import dataclass
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.decoupling import TaskDynamics, TaskError
+from noninteract_ros.control.impedance import Impedance
+from noninteract_ros.control.joint_safety import SafetyReport
+from noninteract_ros.control.subtask_input import Led
+from noninteract_ros.subtasks.subtask import SubtaskState
+from noninteract_ros.team.team import TeamState
+
+
+@dataclass(frozen=True)
+class Mode:
+    """How the torque is made; a change is bumpless.
+
+    Attributes:
+        law: One of `decoupling.LAWS`.
+        impedance: Gains of all subtasks.
+        stopped: Damps to rest instead of following the law.
+    """
+
+    law: str
+    impedance: Impedance
+    stopped: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """Everything that one step of the controller found and decided.
+
+    Attributes:
+        torque: Control torque, shape (n,) [N or N m].
+        state: Team dynamics at the state.
+        task: Actual subtask values and Jacobians.
+        x_rate: Actual subtask velocities, shape (n,) [m/s; rad/s].
+        error: Tracking state of the subtasks.
+        led: What each subtask is asked to do.
+        dynamics: Task dynamics at the state.
+        task_acceleration: Commanded task acceleration, shape (n,) [m/s^2].
+        feedback: Coupling force D e_rate + h(e) of each subtask, which an operator's device
+            feels, shape (n,) [N].
+        law_share: Share of the law in the joint acceleration; below 1 near a singularity.
+        regularity: Regularity of the task Jacobian, relative to the initial one.
+        safety: What the limits of the joints took or added.
+        restarted: Why every subtask was put to rest where it is, or an empty text.
+    """
+
+    torque: Array
+    state: TeamState
+    task: SubtaskState
+    x_rate: Array
+    error: TaskError
+    led: tuple[Led, ...]
+    dynamics: TaskDynamics
+    task_acceleration: Array
+    feedback: Array
+    law_share: float
+    regularity: float
+    safety: SafetyReport
+    restarted: str
