@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The hand that holds the haptic device: a mass-damper-spring that feels the feedback force."""
+"""The hand that holds the haptic device: a mass-damper-spring that feels the feedback."""
 
 import numpy as np
 from scipy.linalg import expm
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
+from noninteract_ros.subtasks import so3
+from noninteract_ros.subtasks.layout import Layout
 
 
 class Hand:
@@ -47,10 +49,58 @@ class Hand:
 
     def deflect(self, intended: Reference, force: Array) -> Reference:
         """The device's motion under a force [N], shape (dim,), about the intended one."""
+        deviation = self.deviation(force)
+        return Reference(
+            intended.position + deviation.position,
+            intended.velocity + deviation.velocity,
+            intended.acceleration + deviation.acceleration,
+        )
+
+    def deviation(self, force: Array) -> Reference:
+        """How the device moves away from the intended motion under a force [N], shape (dim,)."""
         error, error_rate = self._state
         pull = force - self._damping * error_rate - self._stiffness * error
-        return Reference(
-            intended.position + error,
-            intended.velocity + error_rate,
-            intended.acceleration + pull / self._mass,
+        return Reference(error, error_rate, pull / self._mass)
+
+
+class TurningHand:
+    """A hand that also turns: its deviation has rotation vectors phi, each a mass-damper-spring.
+
+    A torque acts on phi through A(phi)', so that its power on the device's turning is its power
+    on phi: the hand stays passive.
+
+    Args:
+        place: Hand of the plain coordinates.
+        turn: Hand of the rotation vectors, with an inertia for a mass.
+        layout: Layout of the device's values.
+    """
+
+    def __init__(self, place: Hand, turn: Hand, layout: Layout) -> None:
+        self._place, self._turn, self._layout = place, turn, layout
+
+    def reset(self) -> None:
+        """Puts the device back on the intended motion."""
+        self._place.reset()
+        self._turn.reset()
+
+    def advance(self, force: Array, periods: int) -> None:
+        """Lets a feedback [N, N m], shape (dim,), act for a number of update periods."""
+        self._place.advance(force[self._layout.rates], periods)
+        for _ in range(periods):  # A(phi) moves on with phi.
+            self._turn.advance(self._torque(force), 1)
+
+    def deflect(self, intended: Reference, force: Array) -> Reference:
+        """The device's motion under a feedback [N, N m], shape (dim,), about the intended one."""
+        place = self._place.deviation(force[self._layout.rates])
+        turn = self._turn.deviation(self._torque(force))
+        gap = Reference(
+            self._layout.merged(place.position, turn.position),
+            self._layout.merged(place.velocity, turn.velocity),
+            self._layout.merged(place.acceleration, turn.acceleration),
         )
+        return intended.plus(gap, self._layout)
+
+    def _torque(self, force: Array) -> Array:
+        torque = force[self._layout.angular]
+        phi = self._turn.deviation(torque.ravel()).position.reshape(-1, 3)
+        return np.einsum("rji,rj->ri", so3.jacobian(phi), torque).ravel()

@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
+from noninteract_ros.subtasks.layout import Layout
 
 
 def blend(u: float) -> tuple[float, float, float]:
@@ -30,30 +31,43 @@ class RestToRest:
 
     Move i leads from `values[i]` to `values[i + 1]`, beginning at `starts[i]` and lasting
     `durations[i]`. Moves are in order of time and do not overlap; between them the motion rests.
+    Rotations go the shortest way, about a fixed axis.
     """
 
-    def __init__(self, starts: ArrayLike, durations: ArrayLike, values: ArrayLike) -> None:
+    def __init__(
+        self,
+        starts: ArrayLike,
+        durations: ArrayLike,
+        values: ArrayLike,
+        layout: Layout | None = None,
+    ) -> None:
         """Takes moves that were checked.
 
         Args:
             starts: Times at which the moves start [s], shape (n,), increasing.
             durations: Their durations [s], shape (n,), positive.
-            values: Resting values, shape (n + 1, dim).
+            values: Resting values, shape (n + 1, size).
+            layout: Layout of a value; plain numbers, if None.
         """
         self._starts: Array = np.array(starts, dtype=np.float64)
         self._durations: Array = np.array(durations, dtype=np.float64)
         self._values: Array = np.array(values, dtype=np.float64)
+        self._layout = layout or Layout.numbers(self._values.shape[1])
 
     def __call__(self, t: float) -> Reference:
         """The motion at time `t` [s]."""
         move = int(np.searchsorted(self._starts, t, side="right")) - 1
         if move < 0:
-            return Reference.still(self._values[0])
+            return Reference.still(self._values[0], self._layout)
         duration = float(self._durations[move])
         value, rate, curvature = blend((t - float(self._starts[move])) / duration)
         if value == 1.0:
-            return Reference.still(self._values[move + 1])
-        way = self._values[move + 1] - self._values[move]
+            return Reference.still(self._values[move + 1], self._layout)
+        start = self._values[move]
+        way = self._layout.difference(self._values[move + 1], start)
+        # A rotation vector that keeps its direction changes as the angular velocity says.
         return Reference(
-            self._values[move] + value * way, rate / duration * way, curvature / duration**2 * way
+            self._layout.sum(start, value * way),
+            rate / duration * way,
+            curvature / duration**2 * way,
         )

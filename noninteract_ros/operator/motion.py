@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.operator.minimum_jerk import RestToRest, blend
+from noninteract_ros.subtasks.layout import Layout
 
 Motion = Callable[[float], Reference]
 """Time [s] to the intended position, velocity and acceleration in subtask coordinates."""
@@ -17,9 +18,9 @@ TREMOR_FREQUENCIES = np.array([70.0**0.5, 4.0 * 5.0**0.5, 6.0 * 3.0**0.5, 8.0 * 
 """Hz; in the band of physiological tremor, 8 to 12 Hz, with irrational ratios: never periodic."""
 
 
-def still(position: ArrayLike) -> Motion:
-    """Rests at a position of shape (dim,) [m]."""
-    reference = Reference.still(position)
+def still(position: ArrayLike, layout: Layout | None = None) -> Motion:
+    """Rests at a value of shape (size,) [m; quaternions]."""
+    reference = Reference.still(position, layout)
     return lambda t: reference
 
 
@@ -67,6 +68,26 @@ def circle(centre: ArrayLike, radius: float, frequency: float, ramp: float) -> M
     return motion
 
 
+def rocking(rotation: ArrayLike, frequency: float, ramp: float) -> Motion:
+    """Rotation vectors that swing with the sine of a circle's angle, from rest at t = 0.
+
+    Args:
+        rotation: Amplitude of the rotation vectors [rad], shape (dim,).
+        frequency: Angular frequency after the start [rad/s].
+        ramp: Time in which the angular rate grows [s]; 0 starts at full rate.
+    """
+    size = np.array(rotation, dtype=np.float64)
+
+    def motion(t: float) -> Reference:
+        angle, rate, growth = (frequency * part for part in _spin_up(t, ramp))
+        sine, cosine = np.sin(angle), np.cos(angle)
+        return Reference(
+            sine * size, (rate * cosine) * size, (growth * cosine - rate**2 * sine) * size
+        )
+
+    return motion
+
+
 def _spin_up(t: float, ramp: float) -> tuple[float, float, float]:
     """Angle, rate and its derivative for a final rate of 1."""
     if t < 0.0:
@@ -79,15 +100,41 @@ def _spin_up(t: float, ramp: float) -> tuple[float, float, float]:
     return angle, rate, growth / ramp
 
 
-def waypoints(times: ArrayLike, points: ArrayLike) -> Motion:
+def waypoints(times: ArrayLike, points: ArrayLike, layout: Layout | None = None) -> Motion:
     """Moves from point to point with minimum jerk, at rest in each; C2 for all times.
 
     Args:
         times: When each point is reached [s], shape (n,), n >= 2, increasing.
-        points: The points [m], shape (n, dim).
+        points: The points [m; quaternions], shape (n, size).
+        layout: Layout of a point; plain numbers, if None.
     """
     instants = np.array(times, dtype=np.float64)
-    return RestToRest(instants[:-1], np.diff(instants), points)
+    return RestToRest(instants[:-1], np.diff(instants), points, layout)
+
+
+def turning(place: Motion, turn: Motion, orientations: ArrayLike, layout: Layout) -> Motion:
+    """Moves along one motion and turns by another.
+
+    Args:
+        place: Motion of the plain numbers.
+        turn: Motion of the rotation vectors that lead away from the orientations [rad].
+        orientations: Quaternion of each rotation, one after the other.
+        layout: Layout of the result.
+    """
+    middle = layout.identity.copy()
+    middle[layout.quaternions] = np.reshape(orientations, (-1, 4))
+    base = Reference.still(middle, layout)
+
+    def motion(t: float) -> Reference:
+        p, r = place(t), turn(t)
+        gap = Reference(
+            layout.merged(p.position, r.position),
+            layout.merged(p.velocity, r.velocity),
+            layout.merged(p.acceleration, r.acceleration),
+        )
+        return base.plus(gap, layout)
+
+    return motion
 
 
 def delayed(motion: Motion, start: float) -> Motion:
@@ -95,27 +142,23 @@ def delayed(motion: Motion, start: float) -> Motion:
     return lambda t: motion(t - start)
 
 
-def with_tremor(motion: Motion, amplitude: float, seed: int, dim: int) -> Motion:
+def with_tremor(motion: Motion, amplitude: ArrayLike, seed: int, layout: Layout) -> Motion:
     """Adds physiological tremor: sinusoids between 8 and 12 Hz with random phases.
 
     Args:
         motion: The steady motion.
-        amplitude: Bound of the tremor in each coordinate [m].
+        amplitude: Bound of the tremor, for all coordinates or for each, shape (dim,) [m; rad].
         seed: Seed of the phases; the same seed gives the same tremor.
-        dim: Number of coordinates.
+        layout: Layout of the motion's values.
     """
-    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, (dim, TREMOR_FREQUENCIES.size))
     rates: Array = 2.0 * np.pi * TREMOR_FREQUENCIES
-    share = amplitude / rates.size
+    phases = np.random.default_rng(seed).uniform(0.0, 2.0 * np.pi, (layout.dim, rates.size))
+    share = np.broadcast_to(amplitude, (layout.dim,))[:, None] / rates.size
 
     def trembling(t: float) -> Reference:
-        steady = motion(t)
         angles = rates * t + phases
         sines, cosines = share * np.sin(angles), share * np.cos(angles)
-        return Reference(
-            steady.position + sines.sum(axis=1),
-            steady.velocity + cosines @ rates,
-            steady.acceleration - sines @ rates**2,
-        )
+        tremor = Reference(sines.sum(axis=1), cosines @ rates, -(sines @ rates**2))
+        return motion(t).plus(tremor, layout)
 
     return trembling

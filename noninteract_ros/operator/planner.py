@@ -6,12 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+import numpy as np
+
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
-from noninteract_ros.errors import ScenarioError
+from noninteract_ros.errors import InputError, ScenarioError
 from noninteract_ros.operator.minimum_jerk import RestToRest
 from noninteract_ros.operator.schedule import TOLERANCE, Schedule
 from noninteract_ros.schema import join, key
+from noninteract_ros.subtasks.layout import Layout
 
 
 @dataclass(frozen=True)
@@ -27,7 +30,9 @@ class PlannerSettings:
 class Formation:
     """A value of the relative subtask and when it is to be taken."""
 
-    value: tuple[float, ...] = key("Value of the subtask, element after element [m]")
+    value: tuple[float, ...] = key(
+        "Value of the subtask, element after element [m], each with its quaternion x, y, z, w"
+    )
     time: float = key("Time at which the change to it starts [s]", 0.0, minimum=0.0)
     duration: float = key("Duration of the change [s]; 0 for the first one", 0.0, minimum=0.0)
 
@@ -42,7 +47,7 @@ class FormationPlanner:
         self,
         settings: PlannerSettings,
         formations: Mapping[str, Formation],
-        dim: int,
+        layout: Layout,
         path: str = "planner",
     ) -> None:
         """Checks the formations against each other and the subtask.
@@ -50,12 +55,13 @@ class FormationPlanner:
         Args:
             settings: Names and order of the formations.
             formations: The formation of each name.
-            dim: Number of coordinates of the commanded subtask.
+            layout: Layout of the commanded subtask's values.
             path: Dotted key of the block, for error messages.
 
         Raises:
-            ScenarioError: No formation, one without a block, of another size, out of order,
-                overlapping the one before, or taken at once where it is not the first.
+            ScenarioError: No formation, one without a block, of another size, with a quaternion
+                that is none, out of order, overlapping the one before, or taken at once where it
+                is not the first.
         """
         if not settings.formations:
             raise ScenarioError(join(path, "formations"), "an empty list", "1 or more names")
@@ -63,12 +69,14 @@ class FormationPlanner:
             if name not in formations:
                 raise ScenarioError(join(path, name), "nothing", "a formation (required)")
         blocks = [formations[name] for name in settings.formations]
-        _check([join(path, name) for name in settings.formations], blocks, dim)
+        paths = [join(path, name) for name in settings.formations]
+        _check_times(paths, blocks)
         self._start = blocks[0].time
         self._motion = RestToRest(
             [block.time for block in blocks[1:]],
             [block.duration for block in blocks[1:]],
-            [block.value for block in blocks],
+            [_value(*item, layout) for item in zip(paths, blocks, strict=True)],
+            layout,
         )
         self._schedule = Schedule(settings.update_rate, [(self._start, math.inf)])
 
@@ -90,11 +98,19 @@ class FormationPlanner:
         return self._schedule.silent_until(t)
 
 
-def _check(paths: Sequence[str], blocks: Sequence[Formation], dim: int) -> None:
-    for path, block in zip(paths, blocks, strict=True):
-        if len(block.value) != dim:
-            allowed = f"{dim} numbers, one per coordinate"
-            raise ScenarioError(join(path, "value"), list(block.value), allowed)
+def _value(path: str, block: Formation, layout: Layout) -> Array:
+    found = list(block.value)
+    if len(found) != layout.size:
+        turns = ", four of them for each rotation" if layout.rotates else ", one per coordinate"
+        raise ScenarioError(join(path, "value"), found, f"{layout.size} numbers{turns}")
+    try:
+        return layout.checked(np.array(found))
+    except InputError as error:
+        allowed = f"unit quaternions x, y, z, w ({error})"
+        raise ScenarioError(join(path, "value"), found, allowed) from error
+
+
+def _check_times(paths: Sequence[str], blocks: Sequence[Formation]) -> None:
     if blocks[0].duration > 0.0:
         allowed = "0 for the first formation: there is none to change from"
         raise ScenarioError(join(paths[0], "duration"), blocks[0].duration, allowed)

@@ -7,22 +7,25 @@ from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.errors import InputError
 from noninteract_ros.operator.motion import Motion
+from noninteract_ros.subtasks.layout import Layout
 
 
-def read_recording(path: str | Path, dim: int) -> tuple[Array, Array]:
+def read_recording(path: str | Path, size: int) -> tuple[Array, Array]:
     """Reads a recorded motion.
 
     Args:
-        path: CSV file with a header: `t` [s], then one column per coordinate [m], as in `t, x, y`.
-        dim: Number of coordinates.
+        path: CSV file with a header: `t` [s], then one column per number of a value [m], as in
+            `t, x, y` or `t, x, y, z, qx, qy, qz, qw`.
+        size: How many numbers a value has.
 
     Returns:
-        Times, shape (n,), increasing, and positions, shape (n, dim), n >= 2.
+        Times, shape (n,), increasing, and values, shape (n, size), n >= 2.
 
     Raises:
         InputError: The file cannot be read; the text names the line and what is wrong with it.
@@ -33,10 +36,10 @@ def read_recording(path: str | Path, dim: int) -> tuple[Array, Array]:
             rows = [(lines.line_num, cells) for cells in lines if any(map(str.strip, cells))]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: {error}") from error
-    _check_header(path, rows[0][1] if rows else [], dim)
+    _check_header(path, rows[0][1] if rows else [], size)
     table: list[list[float]] = []
     for line, cells in rows[1:]:
-        table.append(_numbers(path, line, cells, dim))
+        table.append(_numbers(path, line, cells, size))
         if len(table) > 1 and table[-1][0] <= table[-2][0]:
             raise InputError(
                 f"{path}, line {line}: t = {cells[0]} is not later than the line before"
@@ -47,18 +50,18 @@ def read_recording(path: str | Path, dim: int) -> tuple[Array, Array]:
     return samples[:, 0], samples[:, 1:]
 
 
-def _check_header(path: str | Path, cells: list[str], dim: int) -> None:
+def _check_header(path: str | Path, cells: list[str], size: int) -> None:
     names = [cell.strip() for cell in cells]
-    if len(names) != dim + 1 or names[0] != "t":
+    if len(names) != size + 1 or names[0] != "t":
         found = ", ".join(names) or "nothing"
-        raise InputError(f"{path}: header is {found}, should be t and {dim} coordinates")
+        raise InputError(f"{path}: header is {found}, should be t and {size} coordinates")
     if any(_is_number(name) for name in names):
         raise InputError(f"{path}: the first line must name the columns")
 
 
-def _numbers(path: str | Path, line: int, cells: list[str], dim: int) -> list[float]:
-    if len(cells) != dim + 1:
-        raise InputError(f"{path}, line {line}: {len(cells)} columns, the header has {dim + 1}")
+def _numbers(path: str | Path, line: int, cells: list[str], size: int) -> list[float]:
+    if len(cells) != size + 1:
+        raise InputError(f"{path}, line {line}: {len(cells)} columns, the header has {size + 1}")
     for cell in cells:
         if not (_is_number(cell) and math.isfinite(float(cell))):
             raise InputError(f"{path}, line {line}: '{cell.strip()}' is not a finite number")
@@ -73,24 +76,37 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def replay(times: Array, positions: Array) -> Motion:
+def replay(times: Array, values: Array, layout: Layout | None = None) -> Motion:
     """Replays a recording along its cubic spline, with the first sample at t = 0.
 
     The motion passes through every sample and is C2 between the first and the last. The spline's
     ends are free (not-a-knot): a recording that was cut in mid-motion is not braked to rest, which
-    would ask for an acceleration that the hand never had. Outside, it rests at the end samples.
+    would ask for an acceleration that the hand never had. Rotations follow scipy's spline on
+    SO(3), C2 too, whose ends do not accelerate. Outside, it rests at the end samples.
 
     Args:
         times: Increasing times [s], shape (n,), n >= 2.
-        positions: Positions [m], shape (n, dim).
+        values: Values [m; quaternions], shape (n, size).
+        layout: Layout of a value; plain numbers, if None.
     """
-    spline = CubicSpline(times - times[0], positions)
-    rate, curvature = spline.derivative(1), spline.derivative(2)
-    end = float(times[-1] - times[0])
+    layout = layout or Layout.numbers(values.shape[1])
+    since = times - times[0]
+    plain = CubicSpline(since, values[:, layout.values])
+    turns = [
+        RotationSpline(since, Rotation.from_quat(values[:, part])) for part in layout.quaternions
+    ]
 
     def motion(t: float) -> Reference:
-        if t < 0.0 or t > end:
-            return Reference.still(positions[0 if t < 0.0 else -1])
-        return Reference(spline(t), rate(t), curvature(t))
+        if t < 0.0 or t > since[-1]:
+            return Reference.still(values[0 if t < 0.0 else -1], layout)
+        x, v, a = np.empty(layout.size), np.empty(layout.dim), np.empty(layout.dim)
+        x[layout.values], v[layout.rates], a[layout.rates] = (
+            plain(t, order) for order in range(3)
+        )
+        for turn, part, angular in zip(turns, layout.quaternions, layout.angular, strict=True):
+            rotation = turn(t)
+            x[part] = rotation.as_quat()
+            v[angular], a[angular] = rotation.apply([turn(t, 1), turn(t, 2)])  # from body axes
+        return Reference(x, v, a)
 
     return motion

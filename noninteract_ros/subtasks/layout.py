@@ -169,6 +169,12 @@ class Layout:
         still = np.zeros_like(velocity)
         return self.moved((x, still, still), (way, velocity + dt * acceleration, acceleration))
 
+    def merged(self, plain: Array, turns: Array) -> Array:
+        """Velocity or gap, shape (dim,), of its plain numbers and its rotation vectors."""
+        result = np.empty(self.dim)
+        result[self.rates], result[self.angular] = plain, turns.reshape(-1, 3)
+        return result
+
     def origin(self, x: Array) -> Array:
         """Where coordinates near x are counted from: zeros, and x's own rotations."""
         result = self.identity.copy()

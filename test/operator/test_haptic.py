@@ -11,13 +11,14 @@ from noninteract_ros.operator.hand import Hand
 from noninteract_ros.operator.haptic import HapticDevice, HapticSettings
 from noninteract_ros.operator.motion import swing
 from noninteract_ros.schema import load
+from noninteract_ros.subtasks.layout import Layout
 
 PUSH = np.array([5.0, -2.0])
 
 
 def device(dim=2, **values):
     """A device as a scenario file gives it."""
-    return HapticDevice(load(HapticSettings, values, "haptic"), dim)
+    return HapticDevice(load(HapticSettings, values, "haptic"), Layout.numbers(dim))
 
 
 def test_the_papers_operator_needs_only_its_start():

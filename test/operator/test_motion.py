@@ -9,6 +9,7 @@ from scipy.interpolate import BPoly
 from noninteract_ros.operator import motion as motions
 from noninteract_ros.operator.minimum_jerk import RestToRest
 from noninteract_ros.operator.replay import replay
+from noninteract_ros.subtasks.layout import Layout
 
 TIMES = [0.0, 1.0, 1.5, 4.0]
 POINTS = [[0.0, 0.0], [1.0, -1.0], [1.0, 0.5], [-2.0, 3.0]]
@@ -22,7 +23,7 @@ MOTIONS = {
     "waypoints": motions.waypoints(TIMES, POINTS),
     "replay": replay(RECORDED, np.stack([np.sin(RECORDED), np.cos(2 * RECORDED)], axis=1)),
     "still": motions.still([3.0]),
-    "tremor": motions.with_tremor(SWING, 0.01, seed=3, dim=2),
+    "tremor": motions.with_tremor(SWING, 0.01, seed=3, layout=Layout.numbers(2)),
     "delayed": motions.delayed(SWING, 0.7),
 }
 
@@ -121,7 +122,9 @@ def test_a_single_value_is_held():
 
 def test_tremor_is_bounded_and_in_its_band():
     """The tremor stays below its amplitude and has no power outside 8 to 12 Hz."""
-    trembling = motions.with_tremor(motions.still([0.0, 0.0]), 0.01, seed=5, dim=2)
+    trembling = motions.with_tremor(
+        motions.still([0.0, 0.0]), 0.01, seed=5, layout=Layout.numbers(2)
+    )
     samples = np.array([trembling(t).position for t in np.arange(0.0, 20.0, 0.01)])
     assert np.abs(samples).max() <= 0.01
     spectrum = np.abs(np.fft.rfft(samples * np.hanning(len(samples))[:, None], axis=0)) ** 2
@@ -133,7 +136,9 @@ def test_tremor_is_bounded_and_in_its_band():
 def test_tremor_is_settled_by_its_seed():
     """The same seed trembles alike to the bit, another differently, and no axis like the other."""
     first, again, other = (
-        motions.with_tremor(motions.still([0.0, 0.0]), 0.01, seed, 2)(1.234).position
+        motions.with_tremor(motions.still([0.0, 0.0]), 0.01, seed, Layout.numbers(2))(
+            1.234
+        ).position
         for seed in (7, 7, 8)
     )
     np.testing.assert_array_equal(first, again)
