@@ -15,7 +15,7 @@ from noninteract_ros.team.joint_settings import (
     joint_names,
     per_joint,
 )
-from noninteract_ros.team.robot import AXES, Robot, frame_index, position_limits
+from noninteract_ros.team.robot import AXES, Robot, position_limits
 
 _TRIALS = 4
 
@@ -57,20 +57,21 @@ class ArmSettings(JointSettings):
 
 def tool_axes(model: pin.Model, tool_frame: str, base: pin.SE3) -> tuple[str, ...]:
     """Axes of the world along which the tool moves, at some configurations at least."""
-    data, tool = model.createData(), frame_index(model, tool_frame)
+    data, tool = model.createData(), model.getFrameId(tool_frame)
     rng = np.random.default_rng(0)
     reach = np.zeros(3)
     for _ in range(_TRIALS):
         q = pin.integrate(model, pin.neutral(model), rng.uniform(-1.0, 1.0, model.nv))
-        J = pin.computeFrameJacobian(model, data, q, tool, pin.LOCAL_WORLD_ALIGNED)[:3]
-        reach = np.maximum(reach, np.abs(base.rotation @ J).max(axis=1))
+        J = pin.computeFrameJacobian(model, data, q, tool, pin.LOCAL_WORLD_ALIGNED)
+        linear = J.reshape(6, model.nv)[:3]  # Of a single joint it is a vector.
+        reach = np.maximum(reach, np.abs(base.rotation @ linear).max(axis=1))
     moves = reach > 1e-9 * max(1.0, float(reach.max()))
     return tuple(axis for axis, it_moves in zip(AXES, moves, strict=True) if it_moves)
 
 
 def _check_inertia(name: str, model: pin.Model, q: np.ndarray) -> None:
     """Refuses joints that accelerate without any torque."""
-    M = pin.crba(model, model.createData(), q)
+    M = pin.crba(model, model.createData(), q).reshape(model.nv, model.nv)
     inertias = np.linalg.eigvalsh(M, UPLO="U")
     if inertias.min() <= 1e-12 * max(1.0, inertias.max()):
         weak = joint_names(model)[int(np.argmin(np.diag(M)))]

@@ -9,7 +9,6 @@ import pinocchio as pin
 from noninteract_ros.arrays import Array
 
 AXES = ("x", "y", "z")
-LINKS = (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
 
 
 @dataclass(frozen=True)
@@ -20,7 +19,8 @@ class Robot:
 
     Attributes:
         name: Name in the scenario; prefixes its joints and its topics.
-        model: Kinematics and inertia of this robot alone, each joint of one degree of freedom.
+        model: Kinematics and inertia of this robot alone: joints of one degree of freedom, frames
+            with different names.
         tool_frame: Name of the frame that works, in `model`.
         initial_position: Configuration at the start, shape (nq,).
         axes: Axes of the world along which the tool can translate.
@@ -67,9 +67,3 @@ def without_bound(limits: Array) -> Array:
     """Limits with infinity where Pinocchio means none by the largest number."""
     largest = np.finfo(float).max
     return np.where(np.abs(limits) >= largest, np.copysign(np.inf, limits), limits)
-
-
-def frame_index(model: pin.Model, name: str) -> int | None:
-    """The frame of a name, or None; of a link and a joint with that name it is the link's."""
-    found = [index for index in range(1, model.nframes) if model.frames[index].name == name]
-    return min(found, key=lambda index: model.frames[index].type not in LINKS, default=None)

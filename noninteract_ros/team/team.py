@@ -11,7 +11,7 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import TeamError
 from noninteract_ros.team.joining import append_model
 from noninteract_ros.team.joint_coordinates import JointCoordinates
-from noninteract_ros.team.robot import Robot, frame_index
+from noninteract_ros.team.robot import Robot
 
 PRISMATIC = ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismaticUnaligned")
 
@@ -61,7 +61,7 @@ class Team:
         brake_damping: Damping of the robots' own brakes, shape (n,) [N s/m or N m s/rad].
 
     Raises:
-        TeamError: Fewer than two robots, a name twice, or a tool frame that is not there.
+        TeamError: Fewer than two robots, or a name twice.
     """
 
     def __init__(
@@ -89,7 +89,7 @@ class Team:
         self.friction = np.concatenate([robot.model.damping for robot in robots])
         self._coordinates = JointCoordinates(self.model)
         self._data = self.model.createData()
-        self._tools = [self._tool(robot) for robot in robots]
+        self._tools = [self.model.getFrameId(f"{r.name}/{r.tool_frame}") for r in robots]
         self._lower = np.tri(self.n, k=-1, dtype=bool)
         self._prismatic = all(joint.shortname() in PRISMATIC for joint in self.model.joints[1:])
         self._constant: TeamState | None = None
@@ -98,12 +98,6 @@ class Team:
     def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
         ends = np.cumsum(sizes).tolist()
         return tuple(slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
-
-    def _tool(self, robot: Robot) -> int:
-        index = frame_index(self.model, f"{robot.name}/{robot.tool_frame}")
-        if index is None:
-            raise TeamError(f"{robot.name} has no frame {robot.tool_frame!r}")
-        return index
 
     def configuration_from_joints(self, positions: Array) -> Array:
         """Configuration, shape (nq,), of one position per joint, shape (n,), any angle."""

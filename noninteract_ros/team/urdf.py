@@ -12,9 +12,10 @@ from noninteract_ros.errors import ScenarioError, one_of
 from noninteract_ros.schema import join, key
 from noninteract_ros.team.arm_settings import ArmSettings
 from noninteract_ros.team.joint_settings import configuration_within, joint_names, per_joint
-from noninteract_ros.team.robot import Robot, frame_index, position_limits
+from noninteract_ros.team.robot import Robot, position_limits
 from noninteract_ros.team.urdf_files import read_urdf
 
+CLASH = " (joint)"
 JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic")
 
 
@@ -57,17 +58,17 @@ class UrdfRobot(ArmSettings):
         except ValueError as error:
             raise ScenarioError(path, "a URDF that the parser refuses", "a valid URDF") from error
         model.name = name
-        model = self._reduced(name, model)
+        model = _reduced(model, self.locked_joints, self._locked_configuration(name, model))
         for limits in (model.upperEffortLimit, model.upperVelocityLimit):
             limits[limits == 0.0] = np.inf
-        if frame_index(model, self.tool_frame) is None:
-            links = [frame.name for frame in model.frames if frame.type == pin.FrameType.BODY]
-            allowed = one_of(links, self.tool_frame)
+        frames = [frame.name for frame in model.frames][1:]
+        if self.tool_frame not in frames:
+            allowed = one_of(frames, self.tool_frame)
             raise ScenarioError(join(name, "tool_frame"), repr(self.tool_frame), allowed)
         return self.arm(name, model, self.tool_frame)
 
-    def _reduced(self, name: str, model: pin.Model) -> pin.Model:
-        """The model without its locked joints."""
+    def _locked_configuration(self, name: str, model: pin.Model) -> np.ndarray:
+        """Configuration of all joints in which the locked ones are where they are to be."""
         joints = joint_names(model)
         for joint in self.locked_joints:
             if joint not in joints or self.locked_joints.count(joint) > 1:
@@ -76,16 +77,35 @@ class UrdfRobot(ArmSettings):
         if len(self.locked_joints) == len(joints):
             allowed = f"at least one joint that moves, of {joints}"
             raise ScenarioError(join(name, "locked_joints"), "all joints", allowed)
-        if not self.locked_joints:
-            return model
         path = join(name, "locked_positions")
+        if self.locked_positions and not self.locked_joints:
+            raise ScenarioError(path, list(self.locked_positions), "none without locked_joints")
         given = per_joint(path, self.locked_positions or (0.0,), self.locked_joints)
         places = [joints.index(joint) for joint in self.locked_joints]
         positions, limits = np.zeros(len(joints)), np.tile([[-np.inf], [np.inf]], len(joints))
         positions[places], limits[:, places] = given, position_limits(model)[:, places]
-        locked = [model.getJointId(joint) for joint in self.locked_joints]
-        whole = configuration_within(path, positions.tolist(), model, limits)
-        return pin.buildReducedModel(model, locked, whole)
+        return configuration_within(path, positions.tolist(), model, limits)
+
+
+def _reduced(model: pin.Model, locked: Sequence[str], q: np.ndarray) -> pin.Model:
+    """The model without the locked joints, at q; joint frames and links have different names.
+
+    URDF allows a joint to be called as a link is. Pinocchio then finds neither; nor does it find
+    a joint whose frame is called otherwise, hence the other name for both meanwhile.
+    """
+    links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
+    for frame in list(model.frames)[1:]:
+        if frame.type != pin.FrameType.BODY and frame.name in links:
+            frame.name += CLASH
+    for joint in range(1, model.njoints):
+        model.names[joint] += CLASH if model.names[joint] in links else ""
+    numbers = [
+        index for index, name in enumerate(model.names) if name.removesuffix(CLASH) in locked
+    ]
+    reduced = pin.buildReducedModel(model, numbers, q) if numbers else model
+    for joint in range(1, reduced.njoints):
+        reduced.names[joint] = reduced.names[joint].removesuffix(CLASH)
+    return reduced
 
 
 def _check_joints(path: str, text: str, locked: Sequence[str]) -> None:
