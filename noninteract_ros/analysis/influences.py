@@ -10,6 +10,7 @@ from noninteract_ros.clock import seconds, stamp
 from noninteract_ros.control.inputs import SOURCES
 from noninteract_ros.operator.narrator import Sampler
 
+FIRST_START = "the first state"  # What the controller says of a start that every run has.
 INPUTS = ("target_pose", "target_twist", "wrench")
 
 
@@ -86,6 +87,9 @@ def _changes(recorded: Recorded) -> list[Influence]:
         values = status["values"]
         if values.get("law", recorded.scenario.general.law) != recorded.scenario.general.law:
             texts[f"law changed to {values['law']}"] = None
+        start = values.get("last start", "none")
+        if start not in ("none", FIRST_START):
+            texts[f"the controller started anew: {start}"] = None
         if status["message"] == "stopped":
             texts["the controller was stopped"] = None
         for name, spec in recorded.scenario.subtasks.items():

@@ -3,7 +3,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from rich.table import Table
+from rich.table import Column, Table
 
 from noninteract_ros.analysis.checks import Check
 
@@ -22,13 +22,16 @@ def tables(report: "Report") -> list[Table]:
 
 def checks_table(checks: tuple[Check, ...]) -> Table:
     """A row for each check; what does not apply says why."""
-    table = Table("check", "found", "bound", "unit", "")
+    name, bound, unit, verdict = (
+        Column(title, no_wrap=True) for title in ("check", "bound", "unit", "")
+    )
+    table = Table(name, "found", bound, unit, verdict)
     words = {True: "[green]passed[/]", False: "[bold red]FAILED[/]", None: "[dim]n/a[/]"}
     for check in checks:
         sign = ">=" if check.at_least else "<="
         found = f"[dim]{check.reason}[/]" if check.value is None else f"{check.value:.3g}"
-        bound = f"{sign} {check.limit:.3g}"
-        table.add_row(check.name, found, bound, check.unit, words[check.passed])
+        limit = f"{sign} {check.limit:.3g}"
+        table.add_row(check.name, found, limit, check.unit, words[check.passed])
     return table
 
 

@@ -161,6 +161,41 @@ def test_the_other_source_may_say_what_it_likes(tmp_path: Path) -> None:
     assert found["closed_form.relative"].passed
 
 
+def test_in_wall_time_only_what_holds_there_is_claimed(tmp_path: Path) -> None:
+    """Every run is another one then: nothing about single ticks passes or fails."""
+    found = findings(tmp_path, lose, lockstep=False)
+    by_name = checks(found)
+    for name in ("complete.ticks_missing", "closed_form.relative", "reproduction"):
+        assert by_name[name].passed is None
+        assert "wall time" in by_name[name].reason
+    assert by_name["noninteraction.human"].passed is None
+    assert by_name["storage_positive.relative"].passed
+    assert found.metrics["completeness"]["ticks_missing"] == 4
+
+
+@pytest.mark.parametrize(
+    ("message", "values", "text"),
+    [
+        ("running", {"law": "natural"}, "law changed to natural"),
+        ("running", {"relative led by": "hold"}, "authority over relative changed to hold"),
+        ("running", {"last start": "robot_1/x jumped by 0.3"}, "started anew: robot_1/x jumped"),
+        ("stopped", {}, "the controller was stopped"),
+    ],
+)
+def test_changes_at_run_time_are_named(
+    tmp_path: Path, message: str, values: dict[str, object], text: str
+) -> None:
+    """What the controller says of itself shows that a run left its scenario."""
+
+    def tell(writer: RunWriter) -> None:
+        said = to_diagnostics(1, [to_status("/team/controller", Level.OK, message, values)])
+        writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(said))
+
+    run = record(tmp_path, scenario_values(), 0.1, extra=tell)
+    (found,) = measure(Recorded(run), other_laws=False).metrics["run"]["not_in_the_scenario"]
+    assert text in found
+
+
 def test_diagnostics_are_summed_up(tmp_path: Path) -> None:
     """The worst level, the last one, refusals, and what the recorder lost, which fails."""
 
