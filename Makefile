@@ -36,7 +36,7 @@ $(VENV)/installed: $(METADATA) | $(BIN)/python
 	@touch $@
 
 $(VENV)/installed-dev: $(METADATA) | $(BIN)/python
-	@echo "Installing into $(VENV): about a minute and 1 GB the first time"
+	@echo "Installing into $(VENV): about a minute and 1.5 GB the first time"
 	$(PIP_INSTALL) --editable '.[dev]'
 	@touch $(VENV)/installed $@
 
