@@ -5,8 +5,9 @@ import json
 import os
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 # Matrices of a team are small; BLAS threads would only fight over the cores. Set before numpy.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -16,7 +17,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from noninteract_ros import __version__
-from noninteract_ros.errors import NoninteractError, ScenarioError
+from noninteract_ros.errors import NoninteractError, ScenarioError, one_of
+
+if TYPE_CHECKING:
+    from noninteract_ros.analysis.bench import BenchSettings, Row
 
 app = typer.Typer(
     help="Robot teams led by a human: demos, reports, checks and measurements.",
@@ -184,6 +188,54 @@ def check(
     if failed:
         console.print(f"[bold red]Failed:[/] {'; '.join(failed)}")
     return 0 if found.passed else 1
+
+
+@app.command()
+def bench(
+    part: Annotated[list[str] | None, typer.Option(help="law, node, lockstep or wall.")] = None,
+    ticks: Annotated[int, typer.Option(min=1, help="Cycles timed of each kind.")] = 2000,
+    rounds: Annotated[int, typer.Option(min=1, help="Turns of programs and floor.")] = 2,
+    seconds: Annotated[float, typer.Option(min=0.1, help="Length of each turn [s].")] = 4.0,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Also write JSON.")] = None,
+) -> int:
+    """Measure the law, the controller and the lockstep, each beside its floor."""
+    from noninteract_ros.analysis import bench as measures
+
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    for name in part or ():
+        if name not in measures.PARTS:
+            raise ScenarioError("--part", name, one_of(measures.PARTS, name))
+    settings = measures.BenchSettings(ticks, rounds, seconds)
+    before = measures.machine()
+    figures = measures.as_dict(_measure(part or measures.PARTS, settings), before)
+    console.print(measures.table(figures))
+    if json_file is not None:
+        json_file.write_text(json.dumps(figures, indent=2) + "\n")
+    return 0
+
+
+def _measure(parts: Sequence[str], settings: "BenchSettings") -> list["Row"]:
+    from noninteract_ros.analysis import bench as measures
+    from noninteract_ros.nodes import bench as nodes
+
+    scenarios = measures.bench_scenarios()
+    paper = scenarios["paper"]
+    rows = []
+    with console.status("starting") as status:
+        for name, values in scenarios.items() if {"law", "node"} & set(parts) else ():
+            status.update(f"law and controller node, {name}")
+            material = measures.Material.of(values, settings.ticks + measures.WARM_UP)
+            if "law" in parts:
+                rows += measures.law_rows(name, material, settings.ticks)
+            if "node" in parts:
+                rows += nodes.node_rows(name, values, material, settings.ticks)
+        if "lockstep" in parts:
+            status.update("lockstep of the real programs")
+            rows += nodes.lockstep_rows("paper", paper, settings)
+        if "wall" in parts:
+            status.update("wall time")
+            rows += nodes.wall_rows("paper", paper, settings)
+    return sorted(rows, key=lambda row: measures.PARTS.index(row.part))
 
 
 @app.command()

@@ -16,7 +16,7 @@ from rclpy.experimental import EventsExecutor
 
 from noninteract_ros.nodes.controller import Controller
 from noninteract_ros.nodes.haptic_emulator import HapticEmulator
-from noninteract_ros.nodes.node import ScenarioNode, spin
+from noninteract_ros.nodes.node import NAMESPACE, ScenarioNode, spin
 from noninteract_ros.nodes.recorder import RecorderNode
 from noninteract_ros.nodes.relative_planner import RelativePlanner
 from noninteract_ros.nodes.robot_team import RobotTeam
@@ -55,16 +55,27 @@ class Processes:
         names: Nodes to start.
         scenario_file: Their parameter file.
         out: Output folder; the recording goes to `run.mcap` in it.
+        record: Whether there is a recorder.
+        namespace: Where the programs live.
     """
 
-    def __init__(self, names: list[str], scenario_file: Path, out: Path) -> None:
+    def __init__(
+        self,
+        names: list[str],
+        scenario_file: Path,
+        out: Path,
+        record: bool = True,
+        namespace: str = NAMESPACE,
+    ) -> None:
         self._logs = out / "logs"
         self._logs.mkdir(exist_ok=True)
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
+        shared = ["--ros-args", "--params-file", str(scenario_file), "-r", f"__ns:=/{namespace}"]
         recording = ["-p", f"output:={out / 'run.mcap'}", "-p", "overwrite:=true"]
-        self._start("recorder", [*_parameters(scenario_file), *recording])
+        if record:
+            self._start("recorder", [*shared, *recording])
         for name in names:
-            self._start(name, _parameters(scenario_file))
+            self._start(name, shared)
 
     def _start(self, name: str, arguments: list[str]) -> None:
         command = [sys.executable, "-m", f"noninteract_ros.nodes.{name}", *arguments]
@@ -98,10 +109,6 @@ class Processes:
         self._processes.clear()
         if recorder is not None:
             _end([recorder])
-
-
-def _parameters(file: Path) -> list[str]:
-    return ["--ros-args", "--params-file", str(file)]
 
 
 def _end(processes: list[subprocess.Popen[bytes]]) -> None:

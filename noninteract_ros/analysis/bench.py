@@ -1,0 +1,279 @@
+# SPDX-License-Identifier: Apache-2.0
+"""`noninteract bench`: what a cycle costs, each beside the floor that was measured with it."""
+
+import os
+import platform
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from itertools import cycle
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import pinocchio as pin
+from rich.table import Table
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.inputs import SOURCES
+from noninteract_ros.control.reference import Reference
+from noninteract_ros.rehearsal import History, rehearse
+from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario_file import config_folders, find_scenario, read_parameters
+
+BATCH = 50  # calls of one thing before the other thing has its turn
+WARM_UP = 20  # calls that are not counted
+FORMATION = 30  # robots
+PARTS = ("law", "node", "lockstep", "wall")
+PACKAGES = ("numpy", "pin", "ros-jazzy-rclpy")
+
+
+@dataclass(frozen=True)
+class BenchSettings:
+    """How much is measured.
+
+    Attributes:
+        ticks: Cycles that are timed, of each kind.
+        rounds: How often real programs and their floor take turns.
+        seconds: How long each of these turns lasts [s].
+    """
+
+    ticks: int = 2000
+    rounds: int = 2
+    seconds: float = 4.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """One measured thing.
+
+    Attributes:
+        part: Part of the benchmark.
+        name: What was measured.
+        times: Each measured time [us], shape (count,).
+        floor: Name of the row that it is compared with, or an empty text: it is a floor itself.
+    """
+
+    part: str
+    name: str
+    times: Array
+    floor: str = ""
+
+    @property
+    def median(self) -> float:
+        """[us]."""
+        return float(np.median(self.times))
+
+    @property
+    def p99(self) -> float:
+        """[us]."""
+        return float(np.percentile(self.times, 99))
+
+
+class Timed(Protocol):
+    """Something to be timed again and again."""
+
+    def prepare(self) -> None:
+        """What the next run needs; not timed."""
+
+    def run(self) -> None:
+        """What is timed."""
+
+
+def take_turns(things: Mapping[str, Timed], count: int) -> dict[str, Array]:
+    """Times of each run [us], shape (count,), in batches A B A B ...: all share the load."""
+    times: dict[str, list[float]] = {name: [] for name in things}
+    for thing in things.values():
+        for _ in range(WARM_UP):
+            thing.prepare()
+            thing.run()
+    for done in range(0, count, BATCH):
+        for name, thing in things.items():
+            for _ in range(min(BATCH, count - done)):
+                thing.prepare()
+                began = time.perf_counter_ns()
+                thing.run()
+                times[name].append(1e-3 * (time.perf_counter_ns() - began))
+    return {name: np.array(found) for name, found in times.items()}
+
+
+def formation(count: int) -> dict[str, Any]:
+    """Values of a scenario: unlike point masses in space that keep the places they start at."""
+    names = [f"robot_{i + 1}" for i in range(count)]
+    robots = {
+        name: {
+            "model": "point_mass",
+            "axes": ["x", "y", "z"],
+            "mass": 1.0 + i % 3,
+            "initial_position": [float(i % 6), float(i // 6), 0.0],
+        }
+        for i, name in enumerate(names)
+    }
+    subtasks = {
+        name: {"kind": f"{name}_position", "stiffness": [50.0], "damping": [25.0]}
+        for name in ("cooperative", "relative")
+    }
+    return {"robots": names, **robots, "subtasks": list(subtasks), **subtasks}
+
+
+def bench_scenarios() -> dict[str, dict[str, Any]]:
+    """Values of the scenarios whose law is timed: the paper's, a formation, all with arms."""
+    scenarios = {
+        "paper": read_parameters(find_scenario("paper")),
+        f"formation of {FORMATION}": formation(FORMATION),
+    }
+    for file in sorted(file for folder in config_folders() for file in folder.glob("*.yaml")):
+        values = read_parameters(file)
+        blocks = [values.get(name, {}) for name in values.get("robots", ())]
+        if any(block.get("model", "point_mass") != "point_mass" for block in blocks):
+            scenarios.setdefault(file.stem, values)
+    return scenarios
+
+
+@dataclass(frozen=True)
+class Material:
+    """What a scenario's team goes through while it is timed.
+
+    Attributes:
+        scenario: The scenario, in lockstep.
+        history: Its first ticks.
+    """
+
+    scenario: Scenario
+    history: History
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any], ticks: int) -> "Material":
+        """The first ticks of a scenario, without ROS."""
+        scenario = Scenario.from_dict(values)
+        return cls(scenario, rehearse(scenario, ticks / scenario.general.rate))
+
+
+class LawCycle:
+    """`TeamController.step`, all sources in force speaking at each tick."""
+
+    def __init__(self, material: Material) -> None:
+        scenario = material.scenario
+        team = scenario.build_team()
+        self._stack = scenario.build_stack(team)
+        self._core = scenario.build_controller(team, self._stack)
+        self._rate = scenario.general.rate
+        history = material.history
+        self._rows = cycle(list(zip(history.q, history.v, history.desired, strict=True)))
+        self._tick = -1
+
+    def prepare(self) -> None:
+        """The next state and its references."""
+        self._tick += 1
+        self._now = self._tick / self._rate
+        self._q, self._v, desired = next(self._rows)
+        for task, part in zip(self._stack.subtasks, self._stack.value_slices, strict=True):
+            heard = self._core.inputs[task.name]
+            if heard.authority in SOURCES:
+                still = np.zeros(task.dim)
+                reference = Reference(desired[part], still, still)
+                heard.sources[heard.authority].receive(self._now, reference, self._now)
+
+    def run(self) -> None:
+        """One step."""
+        self._core.step(self._now, self._q, self._v)
+
+
+class PinocchioTerms:
+    """The floor of the law: M, C, g, Jacobians and inverse dynamics by Pinocchio itself."""
+
+    def __init__(self, material: Material) -> None:
+        self._model = material.scenario.build_team().model
+        self._data = self._model.createData()
+        self._rows = cycle(list(zip(material.history.q, material.history.v, strict=True)))
+
+    def prepare(self) -> None:
+        """The next state."""
+        self._q, self._v = next(self._rows)
+
+    def run(self) -> None:
+        """All terms once."""
+        model, data = self._model, self._data
+        pin.computeAllTerms(model, data, self._q, self._v)
+        pin.computeCoriolisMatrix(model, data, self._q, self._v)
+        pin.rnea(model, data, self._q, self._v, self._v)
+
+
+def law_rows(name: str, material: Material, count: int) -> list[Row]:
+    """The law on a scenario's team, and its floor."""
+    law, terms = f"law, {name}", f"Pinocchio's terms, {name}"
+    things: dict[str, Timed] = {law: LawCycle(material), terms: PinocchioTerms(material)}
+    times = take_turns(things, count)
+    return [Row("law", law, times[law], terms), Row("law", terms, times[terms])]
+
+
+def machine() -> dict[str, Any]:
+    """What the numbers were measured on, and how busy it was."""
+    return {
+        "cpu": _cpu(),
+        "cores": len(os.sched_getaffinity(0)),
+        "system": f"{platform.system()} {platform.release()}",
+        "python": platform.python_version(),
+        **{name: _version(name) for name in PACKAGES},
+        "load average": [round(load, 2) for load in os.getloadavg()],
+    }
+
+
+def _cpu() -> str:
+    lines = Path("/proc/cpuinfo").read_text().splitlines()
+    names = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.machine()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "not from a wheel"
+
+
+def as_dict(rows: list[Row], around: Mapping[str, Any]) -> dict[str, Any]:
+    """For JSON: the machine, and the figures of each row."""
+    floors = {row.name: row for row in rows}
+    figures = [
+        {
+            "part": row.part,
+            "name": row.name,
+            "median [us]": round(row.median, 2),
+            "p99 [us]": round(row.p99, 2),
+            "per second": round(1e6 / row.median, 1),
+            "count": len(row.times),
+            "floor": row.floor or None,
+            "ratio": round(row.median / floors[row.floor].median, 2) if row.floor else None,
+        }
+        for row in rows
+    ]
+    return {"machine": dict(around), "rows": figures}
+
+
+def table(figures: Mapping[str, Any]) -> Table:
+    """What `as_dict` returns, for a terminal."""
+    result = Table(title=_title(figures["machine"]), title_justify="left")
+    for name in ("measured", "median [us]", "p99 [us]", "1/s", "count", "of its floor"):
+        result.add_column(name, justify="left" if name == "measured" else "right")
+    last = ""
+    for row in figures["rows"]:
+        if row["part"] != last:
+            result.add_section()
+        last = row["part"]
+        result.add_row(
+            row["name"] if row["floor"] else f"[dim]{row['name']}[/]",
+            f"{row['median [us]']:.1f}",
+            f"{row['p99 [us]']:.1f}",
+            f"{row['per second']:.0f}",
+            str(row["count"]),
+            f"{row['ratio']:.1f} x" if row["ratio"] else "[dim]floor[/]",
+        )
+    return result
+
+
+def _title(around: Mapping[str, Any]) -> str:
+    return ", ".join(
+        f"{name} {value}" if name != "cpu" else str(value) for name, value in around.items()
+    )
