@@ -24,7 +24,8 @@ from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario_file import nest
 
 NAMESPACE = "team"
-LOOP_QOS = QoSProfile(depth=16)  # reliable; deep enough that a busy reader misses no tick
+# Reliable, and so deep that a reader who is kept waiting, as a recorder may be, misses no tick.
+LOOP_QOS = QoSProfile(depth=1000)
 DIAGNOSTICS_PERIOD = 0.5
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 LOG_PERIOD = 2.0
