@@ -22,9 +22,9 @@ class History:
         q: Configuration, shape (ticks, nq).
         v: Velocity, shape (ticks, n).
         torque: Control torque, shape (ticks, n) [N or N m].
-        x: Subtask values, shape (ticks, n).
+        x: Subtask values, shape (ticks, size).
         x_rate: Subtask velocities, shape (ticks, n).
-        desired: Desired subtask values, shape (ticks, n).
+        desired: Desired subtask values, shape (ticks, size).
         storage: Storage functions, shape (ticks, subtasks) [J].
         storage_rate: Their rates, shape (ticks, subtasks) [W].
     """
@@ -68,6 +68,12 @@ class Rehearsal:
             narrator.begin(0.0)
         self._feedback: Array | None = None
 
+    @property
+    def q(self) -> Array:
+        """Configuration, shape (nq,), as joint states carry it: a continuous joint by its angle."""
+        positions = self.team.joints_from_configuration(self.simulation.q)
+        return self.team.configuration_from_joints(positions)
+
     def step(self) -> Tick:
         """One tick: sources, controller, team."""
         now = self.simulation.now
@@ -77,10 +83,7 @@ class Rehearsal:
             for stamp, reference in narrator.speak(now, feedback):
                 if reference is not None:
                     heard.receive(stamp / 1e9, reference, now)
-        # As the joint states carry it: an angle of a continuous joint, not its sine and cosine.
-        positions = self.team.joints_from_configuration(self.simulation.q)
-        q = self.team.configuration_from_joints(positions)
-        tick = self.controller.step(now, q, self.simulation.v)
+        tick = self.controller.step(now, self.q, self.simulation.v)
         if self._felt:
             part = self.stack.slices[self.stack.names.index(self._felt)]
             self._feedback = tick.feedback[part]

@@ -69,7 +69,7 @@ class Controller(ScenarioNode):
         )
         self.subscribe(JointState, "joint_states", self._on_state, raw=True)
         for subtask in stack.subtasks:
-            codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes)
+            codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes, subtask.rotates)
             for source in SOURCES:
                 self._listen(codec, source)
         self.create_service(
@@ -91,7 +91,7 @@ class Controller(ScenarioNode):
 
         def target(message: PoseStamped) -> tuple[int, Motion]:
             stamp, position = codec.target(message)
-            return stamp, Target(position, np.zeros_like(position))
+            return stamp, Target(position, np.zeros(codec.layout.dim))
 
         def rate(message: TwistStamped) -> tuple[int, Motion]:
             stamp, velocity = codec.rate(message)
@@ -102,7 +102,7 @@ class Controller(ScenarioNode):
             return stamp, Force(wanted)
 
         def reference(data: bytes) -> tuple[int, Motion | None]:
-            return _reference(codec.decode(data))
+            return _reference(codec.decode(data), codec.layout.dim)
 
         self.subscribe(
             MultiDOFJointTrajectory,
@@ -271,14 +271,14 @@ class Controller(ScenarioNode):
         return Level.OK, "running", values
 
 
-def _reference(parsed: ParsedReference | Marker) -> tuple[int, Motion | None]:
+def _reference(parsed: ParsedReference | Marker, dim: int) -> tuple[int, Motion | None]:
     """What a source asks for: full, shaped where it lacks derivatives, or nothing (a marker)."""
     if isinstance(parsed, Marker):
         return parsed.stamp_ns, None
     if parsed.velocity is not None and parsed.acceleration is not None:
         motion = Reference(parsed.position, parsed.velocity, parsed.acceleration)
         return parsed.stamp_ns, motion
-    velocity = np.zeros_like(parsed.position) if parsed.velocity is None else parsed.velocity
+    velocity = np.zeros(dim) if parsed.velocity is None else parsed.velocity
     return parsed.stamp_ns, Target(parsed.position, velocity)
 
 

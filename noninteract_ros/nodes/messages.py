@@ -22,6 +22,7 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes import cdr
 from noninteract_ros.nodes.cdr import CdrTemplate, check_finite
+from noninteract_ros.subtasks.layout import UNIT_TOLERANCE, Layout
 
 WORLD = "world"
 AXES = ("x", "y", "z")
@@ -29,14 +30,13 @@ FIELDS = {geometry.Point: AXES, geometry.Vector3: AXES, geometry.Quaternion: (*A
 POSE = ("x", "y", "z", "rotation x", "rotation y", "rotation z", "rotation w")
 TWIST = ("x", "y", "z", "angular x", "angular y", "angular z")
 WRENCH = ("force x", "force y", "force z", "torque x", "torque y", "torque z")
-UNIT_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class ParsedReference:
-    """What a source asks of a subtask: stamp [ns], position [m], velocity, acceleration (dim,).
+    """What a source asks of a subtask: stamp [ns], value (size,), velocity, acceleration (dim,).
 
-    Velocity [m/s] and acceleration [m/s^2] are None where the message has none.
+    Velocity and acceleration are None where the message has none. Quaternions are unit ones.
     """
 
     stamp_ns: int
@@ -115,43 +115,43 @@ def to_wrench_stamped(time_ns: int, values: Array, frame: str = WORLD) -> geomet
 
 
 class SubtaskCodec:
-    """The messages of one subtask, whose vectors are elements x axes (dim,), element by element.
+    """The messages of one subtask, whose values and velocities run over its elements.
 
-    Coordinates of a message outside the subtask's axes must be finite, and rotations of unit
-    length; they have no further effect.
+    Whatever a subtask does not have in a message must be finite, and rotations of unit length.
 
     Args:
         name: The subtask.
         elements: Names of its elements, as they stand in `joint_names`.
         axes: Axes of each element, out of x, y, z.
+        rotates: Whether each element has a rotation after them.
     """
 
-    def __init__(self, name: str, elements: Sequence[str], axes: Sequence[str]) -> None:
+    def __init__(
+        self, name: str, elements: Sequence[str], axes: Sequence[str], rotates: bool = False
+    ) -> None:
         self.name, self.elements, self.axes = name, tuple(elements), tuple(axes)
-        self._axes = [AXES.index(axis) for axis in axes]
         count = len(self.elements)
-        pose = [7 * element + axis for element in range(count) for axis in self._axes]
-        twist = [6 * element + axis for element in range(count) for axis in self._axes]
-        rows = [
-            pose,
-            [7 * count + place for place in twist],
-            [13 * count + place for place in twist],
-        ]
-        # Where position, velocity and acceleration are among all numbers of a message.
-        self._places = [np.array(row) for row in rows]
+        self.layout = Layout([len(self.axes)] * count, [rotates] * count)
+        places = [AXES.index(axis) for axis in axes]
+        self._in_pose = places + ([3, 4, 5, 6] if rotates else [])
+        self._in_twist = places + ([3, 4, 5] if rotates else [])
+        pose = np.array([7 * e + place for e in range(count) for place in self._in_pose])
+        twist = np.array([6 * e + place for e in range(count) for place in self._in_twist])
+        # Where value, velocity and acceleration are among all numbers of a message.
+        self._places = [pose, 7 * count + twist, 13 * count + twist]
         self._marker = CdrTemplate(self._motion(0))
         self._templates = [
             CdrTemplate(self._motion(given), np.concatenate(self._places[:given]).tolist())
             for given in (1, 2, 3)
         ]
-        self._wrench = CdrTemplate(to_wrench_stamped(0, np.zeros(6)), self._axes)
+        self._wrench = CdrTemplate(to_wrench_stamped(0, np.zeros(6)), self._in_twist)
 
     def encode(self, time_ns: int, *motion: Array) -> bytes:
         """Serialized MultiDOFJointTrajectory: a reference, the state or the desired motion.
 
         Args:
             time_ns: Stamp [ns].
-            motion: Position [m], and where known velocity [m/s] and acceleration [m/s^2], (dim,).
+            motion: Value (size,), and where known velocity and acceleration (dim,).
         """
         return self._templates[len(motion) - 1].encode(np.concatenate(motion), time_ns)
 
@@ -160,7 +160,7 @@ class SubtaskCodec:
         return self._marker.encode(np.zeros(0), time_ns)
 
     def encode_wrench(self, time_ns: int, force: Array) -> bytes:
-        """Serialized WrenchStamped with a force (dim,) [N]; for a subtask with one element."""
+        """Serialized WrenchStamped with a force (dim,); for a subtask with one element."""
         return self._wrench.encode(force, time_ns)
 
     def decode(self, data: bytes) -> ParsedReference | Marker:
@@ -197,23 +197,23 @@ class SubtaskCodec:
         return self._parsed(stamp, flat(*parts))
 
     def target(self, message: geometry.PoseStamped) -> tuple[int, Array]:
-        """Stamp [ns] and position (dim,) [m] of a set-point; raises InputError as `reference`."""
+        """Stamp [ns] and value (size,) of a set-point; raises InputError as `reference`."""
         values = flat(message.pose.position, message.pose.orientation)
         self._check_single(message, values, POSE)
         check_rotations(values[None, 3:], self.elements)
-        return stamp_ns(message.header.stamp), values[self._axes]
+        return stamp_ns(message.header.stamp), self.layout.checked(values[self._in_pose])
 
     def rate(self, message: geometry.TwistStamped) -> tuple[int, Array]:
-        """Stamp [ns] and velocity (dim,) [m/s] of a rate; raises InputError as `reference`."""
+        """Stamp [ns] and velocity (dim,) of a rate; raises InputError as `reference`."""
         values = flat(message.twist.linear, message.twist.angular)
         self._check_single(message, values, TWIST)
-        return stamp_ns(message.header.stamp), values[self._axes]
+        return stamp_ns(message.header.stamp), values[self._in_twist]
 
     def force(self, message: geometry.WrenchStamped) -> tuple[int, Array]:
-        """Stamp [ns] and force (dim,) [N] of a source; raises InputError as `reference`."""
+        """Stamp [ns] and force (dim,) of a source; raises InputError as `reference`."""
         values = flat(message.wrench.force, message.wrench.torque)
         self._check_single(message, values, WRENCH)
-        return stamp_ns(message.header.stamp), values[self._axes]
+        return stamp_ns(message.header.stamp), values[self._in_twist]
 
     def _check_single(self, message: Any, values: Array, labels: Sequence[str]) -> None:
         if len(self.elements) > 1:
@@ -237,7 +237,7 @@ class SubtaskCodec:
         count = len(self.elements)
         check_finite(values, self._label)
         check_rotations(values[: 7 * count].reshape(count, 7)[:, 3:], self.elements)
-        position = values[self._places[0]]
+        position = self.layout.checked(values[self._places[0]])
         rates = [values[at] if at[-1] < len(values) else None for at in self._places[1:]]
         return ParsedReference(stamp, position, *rates)
 

@@ -42,7 +42,7 @@ class SourceNode(ScenarioNode):
         stack = self.scenario.build_stack(team)
         task = stack.subtasks[stack.names.index(subtask)]
         self._sampler, self._feels = sampler, feels
-        self._codec = SubtaskCodec(subtask, task.elements, task.axes)
+        self._codec = SubtaskCodec(subtask, task.elements, task.axes, task.rotates)
         self._joints = JointStateCodec(team.joint_names)
         self._rate, self._update_rate = self.scenario.general.rate, update_rate
         self._narrator = Narrator(sampler, self._rate)

@@ -44,7 +44,8 @@ class Telemetry:
             take = partial(self._on_wrench, name)
             node.subscribe(WrenchStamped, f"{name}/external_wrench", take)
         self._codecs = [
-            SubtaskCodec(task.name, task.elements, task.axes) for task in stack.subtasks
+            SubtaskCodec(task.name, task.elements, task.axes, task.rotates)
+            for task in stack.subtasks
         ]
         self._energy_codec = EnergyCodec(ENERGY_LABELS)
         make = node.create_publisher
@@ -92,9 +93,9 @@ class Telemetry:
             return
         energy = core.energy(tick, self._team.external_torque(tick.state, self._wrenches))
         accounts = np.array([energy.storage, energy.rate, energy.supplied, energy.dissipated]).T
-        for i, (codec, part) in enumerate(zip(self._codecs, slices, strict=True)):
-            wanted = tick.led[i].reference
-            actual = codec.encode(stamp, tick.task.x[part], tick.x_rate[part])
+        for i, codec in enumerate(self._codecs):
+            wanted, values = tick.led[i].reference, self._stack.value_slices[i]
+            actual = codec.encode(stamp, tick.task.x[values], tick.x_rate[slices[i]])
             self._state_to[i].publish(actual)
             self._desired_to[i].publish(
                 codec.encode(stamp, wanted.position, wanted.velocity, wanted.acceleration)

@@ -39,7 +39,7 @@ class SubtaskObject:
         stack: The team's subtasks.
 
     Raises:
-        ScenarioError: A subtask is unknown or `rest` does not fit it.
+        ScenarioError: A subtask is unknown, it rotates, or `rest` does not fit it.
     """
 
     def __init__(self, settings: ObjectSettings, stack: SubtaskStack) -> None:
@@ -47,10 +47,14 @@ class SubtaskObject:
             found = getattr(settings, name)
             if found not in stack.names:
                 raise ScenarioError(f"object.{name}", repr(found), one_of(stack.names, found))
+            if stack.subtasks[stack.names.index(found)].rotates:
+                allowed = "a subtask without rotations: the object is one of positions"
+                raise ScenarioError(f"object.{name}", repr(found), allowed)
         self._stack = stack
         self._columns = LastCall(self._decoupling_columns)
         self._carrying = stack.slices[stack.names.index(settings.carried_by)]
         self._grasping = stack.slices[stack.names.index(settings.grasped_by)]
+        self._grasped = stack.value_slices[stack.names.index(settings.grasped_by)]
         dim = self._grasping.stop - self._grasping.start
         if settings.stiffness and len(settings.rest) != dim:
             raise ScenarioError("object.rest", list(settings.rest), f"{dim} numbers")
@@ -74,7 +78,7 @@ class SubtaskObject:
         """A (n, n) and b (n,) of its torque A dv/dt + b: the mass feels the acceleration."""
         task = self._stack.evaluate(state)
         carried, grasped = self._columns(state.M, task.J)
-        strain = self._stiffness * (task.x[self._grasping] - self._rest)
+        strain = self._stiffness * (task.x[self._grasped] - self._rest)
         A = self._mass * carried @ task.J[self._carrying]
         drift = self._mass * (task.J_rate[self._carrying] @ state.v)
         return A, carried @ drift + grasped @ strain
