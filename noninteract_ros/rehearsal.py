@@ -22,9 +22,9 @@ class History:
         q: Configuration, shape (ticks, nq).
         v: Velocity, shape (ticks, n).
         torque: Control torque, shape (ticks, n) [N or N m].
-        x: Subtask values, shape (ticks, size).
+        x: Subtask values, shape (ticks, n).
         x_rate: Subtask velocities, shape (ticks, n).
-        desired: Desired subtask values, shape (ticks, size).
+        desired: Desired subtask values, shape (ticks, n).
         storage: Storage functions, shape (ticks, subtasks) [J].
         storage_rate: Their rates, shape (ticks, subtasks) [W].
     """

@@ -87,7 +87,9 @@ class Recorded:
         self.t = self.states.stamps - self._origin
         self.ticks = np.round(self.t * self.rate).astype(np.int64)
         columns = self._columns(self.states)
-        self.q, self.v = self.states.position[:, columns], self.states.velocity[:, columns]
+        positions = self.states.position[:, columns]
+        self.q = np.array([self.team.configuration_from_joints(row) for row in positions])
+        self.v = self.states.velocity[:, columns]
 
     def _columns(self, states: JointSeries) -> list[int]:
         missing = [name for name in self.team.joint_names if name not in states.names]
@@ -98,7 +100,8 @@ class Recorded:
     @cached_property
     def constant(self) -> bool:
         """Whether all inertias and Jacobians are constant: point masses and their positions."""
-        if any(task.rotates for task in self.stack.subtasks):
+        turning = len(self.team.q0) > self.team.n  # Continuous joints are no plain numbers.
+        if turning or any(task.rotates for task in self.stack.subtasks):
             return False
         step, still = np.random.default_rng(0).uniform(-0.5, 0.5, (2, self.team.n))
         here = self.team.state(self.team.q0, np.zeros(self.team.n))

@@ -48,10 +48,10 @@ def rehearse_variant(scenario: Scenario, variant: Variant, ticks: int) -> Joints
     """Rehearses a variant of a scenario, first state included."""
     general = replace(scenario.general, law=variant.law)
     rehearsal = Rehearsal(replace(scenario, general=general), variant.human, variant.autonomy)
-    q, v = [rehearsal.simulation.q], [rehearsal.simulation.v]
+    q, v = [rehearsal.q], [rehearsal.simulation.v]
     for _ in range(ticks - 1):
         rehearsal.step()
-        q.append(rehearsal.simulation.q)
+        q.append(rehearsal.q)
         v.append(rehearsal.simulation.v)
     return Joints(np.array(q), np.array(v))
 
