@@ -45,6 +45,8 @@ def main() -> None:
         led = deviation(history, slice(0, 2), cooperative, START)
         kept = deviation(history, slice(2, 4), relative, 0.0)
         print(f"{rate:11.0f} {led:17.2e} {kept:14.2e} {history.storage.min():20.2e}")
+    led, kept = history.storage_rate.max(axis=0)
+    print(f"Fastest growth of a storage: cooperative {led:.2f} W, relative {kept:.2f} W")
 
 
 if __name__ == "__main__":
