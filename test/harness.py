@@ -118,6 +118,11 @@ class Ear:
         """Whether the newest diagnostics of a node contain a text."""
         return lambda: text in self.status.get(node, (0, "", {}))[1]
 
+    def renewed(self, node: str) -> Callable[[], bool]:
+        """Whether a node has told of itself since now."""
+        before = self.status.get(node)
+        return lambda: self.status.get(node) is not before
+
     def history(self, kept: dict[int, bytes]) -> tuple[np.ndarray, ...]:
         """Times [s], positions, velocities and efforts, a row per stamp."""
         rows = [self._codec.decode(kept[stamp]) for stamp in sorted(kept)]
@@ -274,7 +279,7 @@ class Programs:
 
     def __init__(self, folder: Path, domain: int) -> None:
         self._folder = folder
-        self._environment = os.environ | {
+        self.environment = os.environ | {
             "ROS_DOMAIN_ID": str(domain),
             "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
             "OPENBLAS_NUM_THREADS": "1",
@@ -295,7 +300,7 @@ class Programs:
         with self._log(name).open("a") as log:
             process = subprocess.Popen(
                 [sys.executable, *arguments],
-                env=self._environment,
+                env=self.environment,
                 cwd=ROOT,
                 stdout=log,
                 stderr=log,

@@ -18,6 +18,7 @@ from noninteract_ros.scenario_file import read_yaml
 OPTION = "--params-file"
 OVERRIDES = ("-p", "--param")
 COMMAND_LINE = "-p"
+EVERY_NODE = "/**"
 
 
 class _Quoted(yaml.SafeDumper):
@@ -46,14 +47,32 @@ def rewrite(arguments: Sequence[str], folder: Path) -> list[str]:
             items; the error names the file and the key.
     """
     result = list(arguments)
-    for place in range(1, len(result)):
+    given: set[tuple[str, str]] = set()
+    for place in reversed(range(1, len(result))):
         if result[place - 1] == OPTION:
-            content = _checked(result[place])
+            content = _without(_checked(result[place]), given)
             result[place] = str(folder / f"{place}.yaml")
             Path(result[place]).write_text(dump(content))
         elif result[place - 1] in OVERRIDES:
+            given.add((EVERY_NODE, result[place].partition(":=")[0]))
             result[place] = _rewrite_override(result[place])
     return result
+
+
+def _without(block: Mapping[str, Any], given: set[tuple[str, str]], node: str = "") -> Any:
+    """What a file gives nodes, but for the keys that are given again later; adds its own to them.
+
+    ROS keeps values of both types where the later one has another type, and may use the first.
+    """
+    kept: dict[str, Any] = {}
+    for name, value in block.items():
+        if name == "ros__parameters":
+            leaves = {key: item for key, item in _leaves(value) if (node, key) not in given}
+            given.update((node, key) for key in leaves)
+            kept[name] = leaves
+        else:
+            kept[name] = _without(value, given, f"{node}/{name}".replace("//", "/"))
+    return kept
 
 
 def _rewrite_override(text: str) -> str:

@@ -1,0 +1,103 @@
+# SPDX-License-Identifier: Apache-2.0
+"""kill -9 of each program: the others notice, stay safe, and go on when it is back."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from harness import Ear, Programs, Ros, paper, until
+
+NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
+RATE = 100.0
+
+WITHOUT_TEAM = {
+    "controller": "holding: no states of the team",
+    "haptic_emulator": "no states of the team",
+    "relative_planner": "no states of the team",
+}
+# Killed program: who says what about it, in lockstep and in wall time.
+NOTICES = {
+    "haptic_emulator": {
+        True: {"controller": "running without cooperative/human"},
+        False: {"controller": "holding cooperative: source silent"},
+    },
+    "relative_planner": {
+        True: {"controller": "running without relative/autonomy"},
+        False: {"controller": "holding relative: source silent"},
+    },
+    "controller": {
+        True: {"robot_team": "waiting for the command that answers the state"},
+        False: {"robot_team": "braking: no fresh command"},
+    },
+    "robot_team": {True: WITHOUT_TEAM, False: WITHOUT_TEAM},
+}
+
+
+def running(ear: Ear) -> bool:
+    return all(ear.status.get(name, (0, ""))[1] == "running" for name in NAMES)
+
+
+@pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "wall"])
+@pytest.mark.parametrize("victims", [NAMES[:2], NAMES[2:]], ids=["core", "sources"])
+def test_a_killed_program_is_noticed_and_may_return(
+    ros: Ros, programs: Programs, lockstep: bool, victims: list[str]
+) -> None:
+    """Each neighbour says so, the team is at rest or led on, and all run on with the new one."""
+    values = paper(
+        rate=RATE,
+        telemetry_rate=RATE,
+        lockstep=lockstep,
+        lockstep_timeout=0.5,
+        command_timeout=0.3,
+        haptic={"motion": "still", "centre": [0.5, 0.5], "start_time": 0.0},
+        cooperative={"takeover": "shaped"},
+        relative={"takeover": "shaped"},
+    )
+    ear = ros.ear(values)
+    for name in NAMES:
+        programs.start(name, values)
+    for victim in victims:
+        until(lambda: running(ear), f"all run, before {victim}: {ear.status}")
+        programs.kill(victim)
+        ear.status.pop(victim)
+        for name, text in NOTICES[victim][lockstep].items():
+            until(ear.says(name, text), f"{name} says {text!r} of {victim}")
+        SAFE[victim](ear, lockstep)
+        programs.start(victim, values)
+    until(lambda: running(ear), f"all run at the end: {ear.status}")
+    heard = len(ear.states)
+    until(lambda: len(ear.states) > heard + 20, "the team moves on")
+
+
+def led_on(ear: Ear, lockstep: bool) -> None:
+    """The team goes on without a source, and comes to rest."""
+    heard = len(ear.states)
+    until(lambda: len(ear.states) > heard + 20, "the team goes on")
+
+
+def brakes(ear: Ear, lockstep: bool) -> None:
+    """Without commands the team stands still (lockstep), or brakes to rest (wall time)."""
+    if lockstep:
+        heard = len(ear.states)
+        until(ear.renewed("robot_team"), "the team speaks on")
+        assert len(ear.states) == heard
+    else:
+        until(lambda: np.abs(ear.history(ear.states)[2][-1]).max() < 1e-3, "the team is at rest")
+
+
+def holds(ear: Ear, lockstep: bool) -> None:
+    """Without states the controller commands nothing."""
+    heard = len(ear.commands)
+    until(ear.renewed("controller"), "the controller speaks on")
+    assert len(ear.commands) == heard
+    if lockstep:  # The new team counts its time anew.
+        ear.states.clear()
+        ear.commands.clear()
+
+
+SAFE: dict[str, Callable[[Ear, bool], None]] = {
+    "haptic_emulator": led_on,
+    "relative_planner": led_on,
+    "controller": brakes,
+    "robot_team": holds,
+}

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Start and end of the programs, and the scenario as their parameters."""
+
+import json
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+from harness import DEADLINE, Programs, Ros, flat, paper, until
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from rclpy.parameter import Parameter, parameter_value_to_python
+from repository import ROOT
+
+from noninteract_ros.errors import ScenarioError
+from noninteract_ros.nodes.parameter_files import dump, rewrite
+
+PAPER = str(ROOT / "config" / "paper.yaml")
+NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
+
+# One process tries all command lines: the programs' main function returns the exit status.
+TRIES = """
+import contextlib, io, json, sys
+from noninteract_ros.nodes.controller import main
+
+for line in sys.stdin:
+    said = io.StringIO()
+    with contextlib.redirect_stderr(said):
+        status = main(["controller", *json.loads(line)])
+    print(json.dumps([status, said.getvalue()]))
+"""
+
+ROS_ARGS = ["--ros-args", "--params-file"]
+FILES = {
+    "mixed.yaml": "/**: {ros__parameters: {robots: [robot_1, 2]}}",
+    "nothing.yaml": "",
+    "broken.yaml": "/**: {ros__parameters: {rate: [1}}",
+    "beside.yaml": "/**: {rate: 3.0}",
+    "flat.yaml": "rate: 3.0",
+    "value.yaml": "/**: {ros__parameters: 5}",
+    "null.yaml": "/**: {ros__parameters: {rate: }}",
+    "nested.yaml": "/**: {ros__parameters: {rate: [[1], [2]]}}",
+    "date.yaml": "/**: {ros__parameters: {rate: 2020-01-01}}",
+    "typo.yaml": "/**: {ros__parameters: {cooperative: {stifness: [1.0]}}}",
+    "nan.yaml": "/**: {ros__parameters: {cooperative: {damping: [.nan]}}}",
+    "size.yaml": "/**: {ros__parameters: {relative: {damping: [1.0, 2.0, 3.0]}}}",
+    "text.yaml": "/**: {ros__parameters: {rate: fast}}",
+    "other.yaml": "/**: {ros__parameters: {law: nointeracting}}",
+}
+# Arguments after `--ros-args --params-file PAPER`, and what the one line says; {} is the folder.
+WRONG = [
+    (["--params-file", "{}/absent.yaml"], "{}/absent.yaml: (file): found No such file"),
+    (["--params-file", "{}/nothing.yaml"], "{}/nothing.yaml: (file): found nothing"),
+    (["--params-file", "{}/broken.yaml"], "{}/broken.yaml: (file): found while parsing"),
+    (["--params-file", "{}/mixed.yaml"], "{}/mixed.yaml: robots: found ['robot_1', 2]"),
+    (["--params-file", "{}/beside.yaml"], "{}/beside.yaml: /**.rate: found 3.0"),
+    (["--params-file", "{}/flat.yaml"], "{}/flat.yaml: rate: found 3.0"),
+    (["--params-file", "{}/value.yaml"], "{}/value.yaml: /**.ros__parameters: found 5"),
+    (["--params-file", "{}/null.yaml"], "{}/null.yaml: rate: found nothing"),
+    (["--params-file", "{}/nested.yaml"], "{}/nested.yaml: rate: found [[1], [2]]"),
+    (["--params-file", "{}/date.yaml"], "{}/date.yaml: rate: found datetime.date"),
+    (["--params-file", "{}/typo.yaml"], "{}/typo.yaml: cooperative.stifness: found an unknown"),
+    (["--params-file", "{}/nan.yaml"], "{}/nan.yaml: cooperative.damping: found [nan]"),
+    (["--params-file", "{}/size.yaml"], "{}/size.yaml: relative.damping: found [1.0, 2.0, 3.0]"),
+    (["--params-file", "{}/other.yaml"], "{}/other.yaml: law: found 'nointeracting', allowed:"),
+    (["-p", "rate:=0"], "-p: rate: found 0"),
+    (["-p", "rate:=abc"], "-p: rate: found 'abc'"),
+    (["-p", "lockstep:=5"], "-p: lockstep: found 5"),
+    (["--params-file", "{}/text.yaml"], "{}/text.yaml: rate: found 'fast'"),
+    (["-p", "nonsense:=1"], "-p: nonsense: found an unknown key"),
+    (["-p", "robot_1.axes:=[x, x]"], "robot_1.axes: found ['x', 'x']"),
+    (["-p", "robot_1.axes:=[x, 1]"], "-p: robot_1.axes: found ['x', 1]"),
+    (["-p", "a b"], "(arguments): found Failed to parse"),
+    (["--params-file"], "(arguments): found Failed to parse"),
+    (["--nonsense"], "(arguments): found ['--nonsense']"),
+    (["--", "fast"], "(arguments): found fast"),
+]
+
+
+def test_a_wrong_start_is_said_in_one_line(programs: Programs, tmp_path: Path) -> None:
+    """Exit status 2 before anything moves, and one line: file, key, found, allowed."""
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text)
+    lines = [
+        json.dumps([*ROS_ARGS, PAPER, *(item.format(tmp_path) for item in arguments)])
+        for arguments, _ in WRONG
+    ]
+    tried = subprocess.run(
+        [sys.executable, "-c", TRIES],
+        input="\n".join(lines),
+        capture_output=True,
+        text=True,
+        timeout=2 * DEADLINE,
+        env=programs.environment,
+        cwd=ROOT,
+    )
+    assert tried.returncode == 0, tried.stderr
+    answers = [json.loads(line) for line in tried.stdout.splitlines()]
+    for (arguments, expected), (status, said) in zip(WRONG, answers, strict=True):
+        assert status == 2, arguments
+        assert len(said.splitlines()) == 1, said
+        assert expected.format(tmp_path) in said, said
+        assert ", allowed: " in said
+
+
+def test_each_program_refuses_a_wrong_scenario(programs: Programs) -> None:
+    """So does every program on its own, with nothing else on its output."""
+    for name in NAMES:
+        programs.start(name, paper(robot_2={"mass": -1.0}))
+    for name in NAMES:
+        assert programs.running[name].wait(DEADLINE) == 2
+        said = programs.log(name).splitlines()
+        assert len(said) == 1
+        assert "scenario.yaml: robot_2.mass: found -1.0, allowed: a number > 0" in said[0]
+
+
+@pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "wall"])
+@pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_each_program_cleanly(
+    ros: Ros, programs: Programs, lockstep: bool, first: signal.Signals
+) -> None:
+    """In the middle of a run: status 0, and no trace on the output."""
+    values = paper(lockstep=lockstep, rate=200.0)
+    ear = ros.ear(values)
+    for name in NAMES:
+        programs.start(name, values)
+    until(lambda: all(ear.says(name, "running")() for name in NAMES), "all run")
+    second = signal.SIGINT if first == signal.SIGTERM else signal.SIGTERM
+    for name, number in zip(NAMES, (first, second, second, first), strict=True):
+        programs.running[name].send_signal(number)
+    for name in NAMES:
+        assert programs.running[name].wait(DEADLINE) == 0, programs.log(name)
+        assert "Traceback" not in programs.log(name)
+
+
+def test_a_program_without_its_block_does_not_start(ros: Ros) -> None:
+    """The emulator wants a block `haptic`, the planner a block `planner`."""
+    with pytest.raises(ScenarioError, match="haptic: found nothing"):
+        ros.make("haptic_emulator", paper(haptic=None))
+    with pytest.raises(ScenarioError, match="planner: found nothing"):
+        ros.make("relative_planner", paper(planner=None))
+
+
+def test_every_key_is_a_described_parameter(ros: Ros) -> None:
+    """All keys are declared with value, meaning and range; none can be changed in this node."""
+    values = paper(lockstep_sources=[])
+    node = ros.make("robot_team", values)
+    listed = ros.call(ListParameters, "robot_team/list_parameters").result.names
+    expected = {name: (rule, value) for name, _, rule, value in node.scenario.parameters()}
+    assert set(expected) <= set(listed)
+    assert set(dict(flat(values))) <= set(expected)
+    names = list(expected)
+    request = DescribeParameters.Request(names=names)
+    told = ros.call(DescribeParameters, "robot_team/describe_parameters", request).descriptors
+    for name, descriptor in zip(names, told, strict=True):
+        assert descriptor.description == expected[name][0].doc
+        assert descriptor.read_only
+    wanted = ["rate", "robot_1.axes", "relative.edges", "cooperative.authority"]
+    answer = ros.call(
+        GetParameters, "robot_team/get_parameters", GetParameters.Request(names=wanted)
+    )
+    rate, axes, edges, authority = (parameter_value_to_python(item) for item in answer.values)
+    assert (rate, axes, edges, authority) == (1000.0, ["x", "y"], ["robot_1", "robot_2"], "human")
+    change = SetParameters.Request(parameters=[Parameter("rate", value=5.0).to_parameter_msg()])
+    assert not ros.call(SetParameters, "robot_team/set_parameters", change).results[0].successful
+
+
+def test_the_last_word_counts_whatever_its_type(tmp_path: Path) -> None:
+    """A number, a list and a text that are given again, with another type, replace the first."""
+    files = [tmp_path / "first.yaml", tmp_path / "second.yaml"]
+    files[0].write_text("/**: {ros__parameters: {rate: 100, haptic: {file: a, centre: [1, 2]}}}")
+    files[1].write_text("/**: {ros__parameters: {haptic.centre: [0.5, 1.0]}}")
+    arguments = ["--params-file", str(files[0]), "--params-file", str(files[1])]
+    result = rewrite(["", *arguments, "-p", "rate:=20.5"], tmp_path)
+    first, second = (yaml.safe_load(Path(result[place]).read_text()) for place in (2, 4))
+    assert first == {"/**": {"ros__parameters": {"haptic.file": "a"}}}
+    assert second == {"/**": {"ros__parameters": {"haptic.centre": [0.5, 1.0]}}}
+    assert result[5:] == ["-p", "rate:=20.5"]
+    assert rewrite(["", "-p", "axes:=[x, y]"], tmp_path)[2] == 'axes:=["x", "y"]'
+
+
+def test_a_parameter_file_is_read_as_it_is_meant() -> None:
+    """`y` stays a name, whole and other numbers may stand in one list, order is kept."""
+    content = {"/**": {"ros__parameters": {"axes": ["x", "y"], "centre": [0, 1.5]}}}
+    assert dump(content) == (
+        '"/**":\n  "ros__parameters":\n    "axes":\n    - "x"\n    - "y"\n'
+        '    "centre":\n    - 0.0\n    - 1.5\n'
+    )
