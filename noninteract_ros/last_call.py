@@ -2,6 +2,7 @@
 """Terms that do not change are computed once."""
 
 from collections.abc import Callable
+from operator import is_
 from typing import Any, Generic, TypeVar
 
 Result = TypeVar("Result")
@@ -24,8 +25,7 @@ class LastCall(Generic[Result]):
 
     def __call__(self, *arguments: Any) -> Result:
         """The result for these arguments."""
-        last = self._arguments
-        if last is None or any(old is not new for old, new in zip(last, arguments, strict=True)):
+        if self._arguments is None or not all(map(is_, self._arguments, arguments)):
             self._result = self._function(*arguments)
             self._arguments = arguments
         return self._result

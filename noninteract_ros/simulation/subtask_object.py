@@ -2,6 +2,7 @@
 """The object of the paper's Section V: a mass and a stiffness at subtask level."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -51,7 +52,7 @@ class SubtaskObject:
                 allowed = "a subtask without rotations: the object is one of positions"
                 raise ScenarioError(f"object.{name}", repr(found), allowed)
         self._stack = stack
-        self._columns = LastCall(self._decoupling_columns)
+        self._terms = LastCall(self._compute_terms)
         self._carrying = stack.slices[stack.names.index(settings.carried_by)]
         self._grasping = stack.slices[stack.names.index(settings.grasped_by)]
         self._grasped = stack.value_slices[stack.names.index(settings.grasped_by)]
@@ -69,25 +70,42 @@ class SubtaskObject:
             state: Where the team is.
             load: Every other torque but Coriolis and gravity torques, shape (n,) [N or N m].
         """
-        A, b = self.torque_terms(state)
+        terms, b = self._terms_at(state)
         free = load - state.C @ state.v - state.g
-        acceleration = np.linalg.solve(state.M - A, free + b)
-        return acceleration, A @ acceleration + b
+        acceleration = terms.inverse @ (free + b)
+        return acceleration, terms.A @ acceleration + b
 
     def torque_terms(self, state: TeamState) -> tuple[Array, Array]:
         """A (n, n) and b (n,) of its torque A dv/dt + b: the mass feels the acceleration."""
-        task = self._stack.evaluate(state)
-        carried, grasped = self._columns(state.M, task.J)
-        strain = self._stiffness * (task.x[self._grasped] - self._rest)
-        A = self._mass * carried @ task.J[self._carrying]
-        drift = self._mass * (task.J_rate[self._carrying] @ state.v)
-        return A, carried @ drift + grasped @ strain
+        terms, b = self._terms_at(state)
+        return terms.A, b
 
-    def _decoupling_columns(self, M: Array, J: Array) -> tuple[Array, Array]:
-        """Columns M S_i (S_i' M S_i)^-1 of Gamma, of carrying and grasping, shape (n, p_i)."""
+    def _terms_at(self, state: TeamState) -> tuple["_Terms", Array]:
+        task = self._stack.evaluate(state)
+        terms = self._terms(state.M, task.J, task.J_rate)
+        strain = self._stiffness * (task.x[self._grasped] - self._rest)
+        return terms, terms.A_rate @ state.v + terms.grasped @ strain
+
+    def _compute_terms(self, M: Array, J: Array, J_rate: Array) -> "_Terms":
         S = np.linalg.inv(J)
-        columns = []
-        for part in (self._carrying, self._grasping):
-            MS_i = M @ S[:, part]
-            columns.append(np.linalg.solve(S[:, part].T @ MS_i, MS_i.T).T)
-        return columns[0], columns[1]
+        carried, grasped = (
+            _decoupling_columns(M, S[:, part]) for part in (self._carrying, self._grasping)
+        )
+        A = self._mass * carried @ J[self._carrying]
+        A_rate = self._mass * carried @ J_rate[self._carrying]
+        return _Terms(A, A_rate, grasped, np.linalg.inv(M - A))
+
+
+class _Terms(NamedTuple):
+    """What follows from M and J: A and its part with J_rate, Gamma_r, and (M - A)^-1."""
+
+    A: Array
+    A_rate: Array
+    grasped: Array
+    inverse: Array
+
+
+def _decoupling_columns(M: Array, S_i: Array) -> Array:
+    """Columns M S_i (S_i' M S_i)^-1 of Gamma of one subtask, shape (n, p_i)."""
+    MS_i = M @ S_i
+    return np.linalg.solve(S_i.T @ MS_i, MS_i.T).T
