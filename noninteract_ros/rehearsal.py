@@ -22,9 +22,9 @@ class History:
         q: Configuration, shape (ticks, nq).
         v: Velocity, shape (ticks, n).
         torque: Control torque, shape (ticks, n) [N or N m].
-        x: Subtask values, shape (ticks, n).
+        x: Subtask values, shape (ticks, size).
         x_rate: Subtask velocities, shape (ticks, n).
-        desired: Desired subtask values, shape (ticks, n).
+        desired: Desired subtask values, shape (ticks, size).
         storage: Storage functions, shape (ticks, subtasks) [J].
         storage_rate: Their rates, shape (ticks, subtasks) [W].
     """
@@ -70,7 +70,7 @@ class Rehearsal:
 
     @property
     def q(self) -> Array:
-        """Configuration, shape (nq,), as joint states carry it: a continuous joint by its angle."""
+        """Configuration, shape (nq,), as joint states carry it: continuous joints by angles."""
         positions = self.team.joints_from_configuration(self.simulation.q)
         return self.team.configuration_from_joints(positions)
 
