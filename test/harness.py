@@ -26,7 +26,7 @@ from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
 
 from noninteract_ros.clock import seconds
-from noninteract_ros.nodes.cdr import JointStateCodec
+from noninteract_ros.nodes.cdr import JointArrays, JointStateCodec
 from noninteract_ros.nodes.controller import Controller
 from noninteract_ros.nodes.haptic_emulator import HapticEmulator
 from noninteract_ros.nodes.node import ScenarioNode, spin
@@ -118,10 +118,18 @@ class Ear:
         """Whether the newest diagnostics of a node contain a text."""
         return lambda: text in self.status.get(node, (0, "", {}))[1]
 
+    def value(self, node: str, key: str) -> str:
+        """One of the values in the newest diagnostics of a node."""
+        return self.status.get(node, (0, "", {}))[2].get(key, "")
+
     def renewed(self, node: str) -> Callable[[], bool]:
         """Whether a node has told of itself since now."""
         before = self.status.get(node)
         return lambda: self.status.get(node) is not before
+
+    def newest(self) -> JointArrays:
+        """The newest state."""
+        return self._codec.decode(self.states[next(reversed(self.states))])
 
     def history(self, kept: dict[int, bytes]) -> tuple[np.ndarray, ...]:
         """Times [s], positions, velocities and efforts, a row per stamp."""

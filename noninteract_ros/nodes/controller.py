@@ -24,7 +24,7 @@ from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.controller_parameters import LiveParameters
 from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder, state_lead
 from noninteract_ros.nodes.messages import Level, Marker, ParsedReference, SubtaskCodec
-from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker
+from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 from noninteract_ros.nodes.telemetry import Telemetry
 
@@ -79,7 +79,7 @@ class Controller(ScenarioNode):
             Trigger, "~/resume", partial(self._on_trigger, self.core.resume, "running")
         )
         if self.lockstep:
-            self.create_timer(WATCH_PERIOD, self._answer_if_complete, clock=STEADY)
+            self.every(WATCH_PERIOD, self._answer_if_complete)
 
     def _listen(self, codec: SubtaskCodec, source: str) -> None:
         """Subscribes to everything that one source can send to one subtask."""

@@ -63,7 +63,7 @@ class ScenarioNode(Node):
         self._refused: Counter[str] = Counter()
         self._last_refusal = "none"
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.create_timer(DIAGNOSTICS_PERIOD, self.publish_diagnostics, clock=STEADY)
+        self.every(DIAGNOSTICS_PERIOD, self.publish_diagnostics)
 
     def _declare(self) -> None:
         """Declares every key of the scenario: typed, described, read-only unless live here."""
@@ -74,9 +74,12 @@ class ScenarioNode(Node):
                 description=rule.doc,
                 additional_constraints=" | ".join(rule.choices) or rule.numbers_allowed(),
                 read_only=not (rule.live and self.LIVE),
+                # What changes live is checked by the rule, which says more than ROS does.
+                dynamic_typing=rule.live and self.LIVE,
             )
             # An empty list has no type of its own: it is declared, but left unset.
-            typed = EMPTY_TYPES.get(hint, value) if value == () else _plain(value)
+            empty = None if descriptor.dynamic_typing else EMPTY_TYPES.get(hint)
+            typed = empty if value == () else _plain(value)
             self.declare_parameter(name, typed, descriptor, ignore_override=True)
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
@@ -102,12 +105,22 @@ class ScenarioNode(Node):
         """Subscribes; what `take` refuses with an InputError is counted, named and dropped."""
 
         def checked(message: Any) -> None:
-            try:
-                take(message)
-            except InputError as error:
-                self.refuse(topic, str(error))
+            with until_shutdown(self.context):
+                try:
+                    take(message)
+                except InputError as error:
+                    self.refuse(topic, str(error))
 
         self.create_subscription(kind, topic, checked, LOOP_QOS, raw=raw)
+
+    def every(self, period: float, work: Callable[[], None]) -> None:
+        """Has something done again and again, each period [s] of wall time."""
+
+        def guarded() -> None:
+            with until_shutdown(self.context):
+                work()
+
+        self.create_timer(period, guarded, clock=STEADY)
 
     def refuse(self, topic: str, reason: str) -> None:
         """Counts and names an input that is refused whole."""

@@ -21,7 +21,7 @@ from noninteract_ros.nodes import messages
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.lockstep import StampOrder
 from noninteract_ros.nodes.messages import Level
-from noninteract_ros.nodes.node import LOOP_QOS, STEADY, ScenarioNode, Ticker
+from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 
 RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is sent again
@@ -71,7 +71,7 @@ class RobotTeam(ScenarioNode):
         self.create_service(Trigger, "~/step", self._guarded(self._step_once))
         self.create_service(Trigger, "~/reset", self._guarded(self._reset))
         if self.lockstep:
-            self.create_timer(RESEND_PERIOD, self._resend, clock=STEADY)
+            self.every(RESEND_PERIOD, self._resend)
 
     def _on_command(self, data: bytes) -> None:
         stamp, _, _, effort = self._commands.decode(data)

@@ -82,7 +82,7 @@ def brakes(ear: Ear, lockstep: bool) -> None:
         until(ear.renewed("robot_team"), "the team speaks on")
         assert len(ear.states) == heard
     else:
-        until(lambda: np.abs(ear.history(ear.states)[2][-1]).max() < 1e-3, "the team is at rest")
+        until(lambda: np.abs(ear.newest().velocity).max() < 1e-3, "the team is at rest")
 
 
 def holds(ear: Ear, lockstep: bool) -> None:
