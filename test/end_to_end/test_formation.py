@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Thirty robots through the same stack."""
+
+import numpy as np
+from harness import Ros, merged, until
+from repository import ROOT
+
+from noninteract_ros.rehearsal import rehearse
+from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario_file import read_parameters
+
+TICKS = 30
+
+
+def scenario() -> dict:
+    return read_parameters(ROOT / "config" / "formation.yaml")
+
+
+def test_thirty_robots_run_through_the_stack(ros: Ros) -> None:
+    """All nodes, in lockstep: the states are the rehearsal's, to the bit."""
+    values = scenario()
+    rate = values["rate"]
+    stack = ros.stack(merged(values, {"end_time": TICKS / rate})).begin()
+    until(stack.ear.says("robot_team", "finished"), "the end of the run")
+    expected = rehearse(Scenario.from_dict(stack.values), TICKS / rate)
+    assert expected.q.shape == (TICKS, 60)
+    _, q, v, effort = stack.ear.history(stack.ear.states)
+    np.testing.assert_array_equal(q[:-1], expected.q)
+    np.testing.assert_array_equal(v[:-1], expected.v)
+    np.testing.assert_array_equal(effort[1:], expected.torque)
+
+
+def test_the_formation_changes_shape_while_it_is_led_in_a_circle() -> None:
+    """To the end: every distance as planned, and the weighted mean on the human's circle."""
+    built = Scenario.from_dict(scenario())
+    history = rehearse(built, built.general.duration)
+    error = np.abs(history.x - history.desired)
+    assert error[-1].max() < 0.02
+    assert np.ptp(history.desired[:, :2], axis=0).min() > 1.0
+    assert np.abs(history.desired[-1, 2:] - history.desired[0, 2:]).max() > 0.5
+    assert np.linalg.norm(history.q[-1].reshape(30, 2), axis=1).max() < 20.0
