@@ -22,7 +22,8 @@ class Shaper:
     """One step at a time towards a state, within limits; all numbers are plain.
 
     An acceleration beyond the limits is cut off at once: to lead it back with bounded jerk would
-    carry the motion far away. A start from which no motion can be planned becomes rest.
+    carry the motion far away. Where no way to a set-point can be planned the motion slows down,
+    and where not even that can be, it rests.
 
     Args:
         limits: Bounds of velocity, acceleration and jerk, shape (3, p).
@@ -42,14 +43,17 @@ class Shaper:
         away = np.clip(target.position - start.position, -reach, reach)
         near = np.abs(away) < reach
         self._input.target_position = np.where(near, target.position, start.position + away)
-        return self._advance(start, target.velocity, step)
+        planned = self._advance(start, target.velocity, step)
+        return planned or self.at_rate(start, np.zeros_like(start.velocity), step)
 
     def at_rate(self, start: Reference, rate: Array, step: float) -> tuple[Reference, bool]:
         """State `step` seconds on the way to a velocity, and whether it is reached."""
         self._input.control_interface = ControlInterface.Velocity
-        return self._advance(start, rate, step)
+        return self._advance(start, rate, step) or (Reference.still(start.position), False)
 
-    def _advance(self, start: Reference, speed: Array, step: float) -> tuple[Reference, bool]:
+    def _advance(
+        self, start: Reference, speed: Array, step: float
+    ) -> tuple[Reference, bool] | None:
         self._generator.delta_time = step
         self._input.current_position = start.position
         self._input.current_velocity = start.velocity
@@ -61,7 +65,7 @@ class Shaper:
         except (RuckigError, ValueError):  # ValueError: it has no name for some of its failures.
             result = Result.Error
         if result not in (Result.Working, Result.Finished):
-            return Reference.still(start.position), False
+            return None
         reached = Reference(
             np.array(self._output.new_position),
             np.array(self._output.new_velocity),
@@ -97,6 +101,7 @@ class DesiredMotion:
         self._now = Reference.still(x, self._layout)
         self._followed: Reference | None = None
         self._gap: Reference | None = None
+        self._chart: tuple[Array, Reference] | None = None
 
     def advance(self, motion: Motion | None, step: float) -> Reference:
         """Desired motion one tick later.
@@ -106,6 +111,7 @@ class DesiredMotion:
             step: Time since the last tick [s].
         """
         if isinstance(motion, Reference):
+            self._chart = None
             self._now = self._follow(motion, step)
             self._followed = motion
             return self._now
@@ -117,8 +123,11 @@ class DesiredMotion:
     def _shape(self, motion: Target | Rate | None, step: float) -> Reference:
         if isinstance(motion, Target):
             shaped, done = self._towards(motion, step)
-            arrived = done and not motion.velocity.any()
-            return Reference.still(motion.position, self._layout) if arrived else shaped
+            if not done or motion.velocity.any():
+                return shaped
+            self._chart = None
+            return Reference.still(motion.position, self._layout)
+        self._chart = None
         if isinstance(motion, Rate):
             return self._at_rate(motion.velocity, step)[0]
         if not (self._now.velocity.any() or self._now.acceleration.any()):
@@ -127,11 +136,20 @@ class DesiredMotion:
         return Reference.still(shaped.position, self._layout) if done else shaped
 
     def _towards(self, target: Target, step: float) -> tuple[Reference, bool]:
-        """Shapes in coordinates about the target's rotations, which are zero there."""
+        """Shapes in coordinates about the target's rotations, which are zero there.
+
+        The coordinates are kept from tick to tick: ruckig fails now and then where a state that
+        it has made itself comes back with another rounding.
+        """
         layout = self._layout
         origin = Reference.still(layout.origin(target.position), layout)
         goal = Target(layout.difference(target.position, origin.position), target.velocity)
-        shaped, done = self._shaper.towards(self._now.minus(origin, layout), goal, step)
+        if self._chart is not None and np.array_equal(self._chart[0], origin.position):
+            start = self._chart[1]
+        else:
+            start = self._now.minus(origin, layout)
+        shaped, done = self._shaper.towards(start, goal, step)
+        self._chart = (origin.position, shaped)
         return origin.plus(shaped, layout), done
 
     def _at_rate(self, rate: Array, step: float) -> tuple[Reference, bool]:

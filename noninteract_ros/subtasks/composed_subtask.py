@@ -5,9 +5,9 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.subtasks import so3
+from noninteract_ros.subtasks.mixed_position import axis_rows
 from noninteract_ros.subtasks.parts import Part
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
-from noninteract_ros.team.robot import AXES
 from noninteract_ros.team.team import TeamState
 
 
@@ -33,7 +33,7 @@ class ComposedSubtask(Subtask):
         self.name, self.elements, self.axes = name, elements, axes
         self.rotates = rotation is not None
         self._position, self._rotation = position, rotation
-        self._rows = [AXES.index(axis) for axis in axes]
+        self._rows = axis_rows(axes)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
         """Value, Jacobian and Jacobian rate, element after element."""

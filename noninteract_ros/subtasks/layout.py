@@ -131,7 +131,7 @@ class Layout:
             phi = e[part]
             omega, alpha = self._carried(phi, base)
             turn, growth = motion[1][part] - omega, motion[2][part] - alpha
-            growth = growth - np.cross(turn, omega)
+            growth = growth - _times(so3.hat(turn), omega)
             A_inverse = so3.inverse_jacobian(phi)
             phi_rate = _times(A_inverse, turn)
             bend = _times(so3.jacobian_rate(phi, phi_rate), phi_rate)
@@ -150,7 +150,7 @@ class Layout:
             turn = _times(A, phi_rate)
             growth = _times(A, phi_rate_rate) + _times(so3.jacobian_rate(phi, phi_rate), phi_rate)
             velocity[part] = turn + omega
-            acceleration[part] = growth + np.cross(turn, omega) + alpha
+            acceleration[part] = growth + _times(so3.hat(turn), omega) + alpha
         return self.sum(base[0], gap[0]), velocity, acceleration
 
     def ahead(self, motion: Motion, dt: float) -> Motion:
@@ -188,4 +188,4 @@ class Layout:
 
 
 def _times(matrices: Array, vectors: Array) -> Array:
-    return np.einsum("...ij,...j->...i", matrices, vectors)
+    return (matrices @ vectors[..., None])[..., 0]

@@ -24,10 +24,7 @@ class MixedPosition(Subtask):
     ) -> None:
         self.name, self.elements, self.axes = name, elements, axes
         self._weights = weights
-        rows = [AXES.index(axis) for axis in axes]
-        ordered = rows == list(range(rows[0], rows[0] + len(rows)))
-        # A slice is a view; indices in another order need a copy.
-        self._rows = slice(rows[0], rows[-1] + 1) if ordered else rows
+        self._rows = axis_rows(axes)
         self._mixed, self._mixed_rate = LastCall(self._mix), LastCall(self._mix)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
@@ -40,6 +37,13 @@ class MixedPosition(Subtask):
         count, _, n = tools.shape
         along_axes = tools[:, self._rows].reshape(count, -1)
         return (self._weights @ along_axes).reshape(-1, n)
+
+
+def axis_rows(axes: tuple[str, ...]) -> slice | list[int]:
+    """Places of axes among x, y, z: a slice, which is a view, or indices in another order."""
+    rows = [AXES.index(axis) for axis in axes]
+    ordered = rows == list(range(rows[0], rows[0] + len(rows))) if rows else False
+    return slice(rows[0], rows[-1] + 1) if ordered else rows
 
 
 def chosen_axes(name: str, axes: tuple[str, ...], team: Team) -> tuple[str, ...]:

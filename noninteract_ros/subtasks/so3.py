@@ -15,9 +15,14 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+import pinocchio as pin
 from scipy.special import bernoulli
 
 from noninteract_ros.arrays import Array
+
+# Twelve terms leave less than rounding where t < 1.
+_TERMS = range(12)
+_POWERS = np.arange(float(len(_TERMS)))
 
 
 class _Coefficient:
@@ -36,8 +41,8 @@ class _Coefficient:
         slope: Callable[[Array], Array],
     ) -> None:
         self._value, self._slope = value, slope
-        self._series = np.array(series)[::-1]
-        self._slope_series = 2.0 * np.polyder(self._series)
+        self._series = np.array(series)
+        self._slope_series = 2.0 * _POWERS[1:] * self._series[1:]
 
     def value(self, phi: Array) -> Array:
         """f(|phi|), shape (..., 1, 1)."""
@@ -51,14 +56,13 @@ class _Coefficient:
     @staticmethod
     def _at(phi: Array, series: Array, closed: Callable[[Array], Array]) -> Array:
         square = (phi * phi).sum(axis=-1)[..., None, None]
-        near = np.polyval(series, np.minimum(square, 1.0))
-        if square.size and square.max() < 1.0:
+        powers = np.minimum(square, 1.0)[..., None] ** _POWERS[: len(series)]
+        near = powers @ series
+        if not (square >= 1.0).any():
             return near
         return np.where(square < 1.0, near, closed(np.sqrt(np.maximum(square, 1.0))))
 
 
-# Twelve terms leave less than rounding where t < 1.
-_TERMS = range(12)
 _BERNOULLI = bernoulli(2 * len(_TERMS))
 _A = _Coefficient(
     [(-1) ** k / math.factorial(2 * k + 2) for k in _TERMS],
@@ -80,6 +84,12 @@ _GENERATORS: Array = np.zeros((3, 3, 3))  # hat(w)[j, k] = sum over i of w[i] G[
 for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     _GENERATORS[_i, _k, _j], _GENERATORS[_i, _j, _k] = 1.0, -1.0
 _GENERATORS = _GENERATORS.reshape(3, 9)
+_LEFT: Array = np.zeros((4, 4, 4))  # p q [j] = sum over i and k of p[i] L[i, j, k] q[k]
+_LEFT[:3, :3, :3] = _GENERATORS.reshape(3, 3, 3)
+_LEFT[3] = np.eye(4)
+for _i in range(3):
+    _LEFT[_i, _i, 3], _LEFT[_i, 3, _i] = 1.0, -1.0
+_LEFT = _LEFT.reshape(4, 16)
 _IDENTITY = np.eye(3)
 
 
@@ -109,15 +119,8 @@ def log(q: Array) -> Array:
 
 def product(p: Array, q: Array) -> Array:
     """Quaternion of the rotation q followed by p, shape (..., 4)."""
-    px, py, pz, pw = np.moveaxis(p, -1, 0)
-    qx, qy, qz, qw = np.moveaxis(q, -1, 0)
-    parts = (
-        pw * qx + px * qw + py * qz - pz * qy,
-        pw * qy - px * qz + py * qw + pz * qx,
-        pw * qz + px * qy - py * qx + pz * qw,
-        pw * qw - px * qx - py * qy - pz * qz,
-    )
-    return np.stack(parts, axis=-1)
+    from_left = (p @ _LEFT).reshape(*p.shape, 4)
+    return (from_left @ q[..., None])[..., 0]
 
 
 def inverse(q: Array) -> Array:
@@ -137,23 +140,9 @@ def matrix(q: Array) -> Array:
 
 
 def quaternion(R: Array) -> Array:
-    """Unit quaternion of a rotation matrix with w >= 0, shape (..., 4).
-
-    Each row of 4 q q' is the quaternion times one of its components; the longest row is taken.
-    """
-    xx, yy, zz = R[..., 0, 0], R[..., 1, 1], R[..., 2, 2]
-    both, turn = R + np.swapaxes(R, -1, -2), R - np.swapaxes(R, -1, -2)
-    xy, xz, yz = both[..., 0, 1], both[..., 0, 2], both[..., 1, 2]
-    x, y, z = turn[..., 2, 1], turn[..., 0, 2], turn[..., 1, 0]
-    rows = (
-        (1.0 + xx - yy - zz, xy, xz, x),
-        (xy, 1.0 - xx + yy - zz, yz, y),
-        (xz, yz, 1.0 - xx - yy + zz, z),
-        (x, y, z, 1.0 + xx + yy + zz),
-    )
-    table = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-    longest = np.einsum("...ii->...i", table).argmax(axis=-1)[..., None, None]
-    q = normalized(np.take_along_axis(table, longest, axis=-2)[..., 0, :])
+    """Unit quaternion of a rotation matrix with w >= 0, shape (..., 4)."""
+    rows = [pin.Quaternion(matrix).coeffs() for matrix in R.reshape(-1, 3, 3)]
+    q = normalized(np.array(rows)).reshape(*R.shape[:-2], 4)
     return np.where(q[..., 3:] < 0.0, -q, q)
 
 

@@ -90,7 +90,7 @@ class TeamRotation:
         cross = 0.5 * so3.hat(c)
         J = mean - cross @ apart
         omega_H = J @ state.v - H @ (state.tool_jacobians[0, 3:] @ state.v)
-        c_rate = 0.5 * (omega_H + np.cross(omega_H, c) + c * (omega_H @ c))
+        c_rate = 0.5 * (omega_H + so3.hat(omega_H) @ c + c * (omega_H @ c))
         J_rate = mean_rate - cross @ apart_rate - 0.5 * so3.hat(c_rate) @ apart
         return Rows((H @ R_1)[None], J[None], J_rate[None])
 
