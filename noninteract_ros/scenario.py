@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from noninteract_ros.control.inputs import SOURCES
-from noninteract_ros.control.joint_safety import SafetySettings
+from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_of
 from noninteract_ros.operator.haptic import HapticDevice, HapticSettings
@@ -125,9 +125,9 @@ class Scenario:
         team = self.build_team()
         stack = self.build_stack(team)
         self.build_controller(team, stack)
-        self.build_simulation(team, stack)
         for push_name, push in self.pushes.items():
             push.check(push_name, team)
+        self.build_simulation(team, stack)
         if self.haptic:
             self.build_haptic(stack)
         if self.planner:

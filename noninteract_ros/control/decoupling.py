@@ -104,12 +104,13 @@ def task_terms(
 def inverse(J: Array) -> Array:
     """J^-1, shape (n, n); of an exactly singular J that of a neighbour, with very large entries.
 
-    Who uses it near a singularity has to look at `joint_safety.regularity` first.
+    Who uses it near a singularity has to look at `singularity.regularity` first.
     """
     try:
         return np.linalg.inv(J)
     except np.linalg.LinAlgError:
-        return np.linalg.inv(J + 1e-9 * np.abs(J).max() * np.eye(len(J)))
+        size = float(np.abs(J).max()) or 1.0
+        return np.linalg.inv(J + 1e-9 * size * np.eye(len(J)))
 
 
 def commanded_acceleration(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What keeps arms whole where the law alone would not: singularities and the limits of joints.
+"""What keeps arms whole where the law alone would not: the limits of their joints.
 
 Nothing here acts on a team that stays inside its limits: the torque is then the law's, to the bit.
 """
@@ -9,53 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.errors import ScenarioError
-from noninteract_ros.schema import key
+from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.team.team import Team
-
-
-@dataclass(frozen=True)
-class SafetySettings:
-    """The block `safety` of a scenario."""
-
-    singularity_begin: float = key(
-        "Regularity, relative to the initial one, below which the law begins to fade out",
-        0.1,
-        minimum=0.0,
-        maximum=1.0,
-    )
-    singularity_end: float = key(
-        "Relative regularity below which the team only recovers", 0.03, minimum=0.0, maximum=1.0
-    )
-    recovery_stiffness: float = key(
-        "Pull back to the last regular configuration [1/s^2]", 25.0, minimum=0.0
-    )
-    recovery_damping: float = key("Damping of the recovery [1/s]", 10.0, positive=True)
-    position_margin: float = key(
-        "Distance to a joint limit at which it begins to repel [m or rad]", 0.1, positive=True
-    )
-    position_stiffness: float = key(
-        "Stiffness of that repulsion [N/m or N m/rad]", 200.0, minimum=0.0
-    )
-    position_damping: float = key(
-        "Damping of a joint at its limit [N s/m or N m s/rad]", 10.0, minimum=0.0
-    )
-    velocity_damping: float = key(
-        "Damping of what a joint is too fast [N s/m or N m s/rad]", 20.0, minimum=0.0
-    )
-    torque_rate: float = key(
-        "Largest change of a joint torque per second [N/s or N m/s]; 0: none", 0.0, minimum=0.0
-    )
-
-    def check(self) -> None:
-        """Refuses thresholds in the wrong order.
-
-        Raises:
-            ScenarioError: `singularity_end` is not below `singularity_begin`.
-        """
-        if self.singularity_end >= self.singularity_begin > 0.0:
-            allowed = f"< singularity_begin ({self.singularity_begin:g})"
-            raise ScenarioError("safety.singularity_end", self.singularity_end, allowed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,136 +18,141 @@ class SafetyReport:
     """What was necessary at one tick.
 
     Attributes:
-        effort_share: Share of the torque beyond gravity that effort limits leave.
+        effort_share: Share of the torque beyond gravity that effort limits leave of the law's.
         rate_share: Share of the torque's change that the rate limit leaves.
         repelled: Joints that a position limit repels, as indices.
         too_fast: Joints that are beyond their velocity limit, as indices.
+        finite: Whether the law gave a torque at all.
+        clipped: Whether repulsion and brake together were more than the effort limits allow.
     """
 
-    effort_share: float
-    rate_share: float
-    repelled: tuple[int, ...]
-    too_fast: tuple[int, ...]
+    effort_share: float = 1.0
+    rate_share: float = 1.0
+    repelled: tuple[int, ...] = ()
+    too_fast: tuple[int, ...] = ()
+    finite: bool = True
+    clipped: bool = False
 
-
-def regularity(S: Array) -> float:
-    """1 / |J^-1|_F: smooth, zero where J is singular, at most the smallest singular value of J."""
-    norm = float(np.linalg.norm(S))
-    return 1.0 / norm if np.isfinite(norm) and norm > 0.0 else 0.0
+    @property
+    def acted(self) -> bool:
+        """Whether the torque is another one than the law's."""
+        changed = self.effort_share < 1.0 or self.rate_share < 1.0 or self.clipped
+        return changed or bool(self.repelled or self.too_fast) or not self.finite
 
 
 class JointSafety:
-    """Blends, repels and bounds, joint by joint.
+    """Bounds, repels and brakes, joint by joint.
+
+    Repulsion and brake are sized by each joint's own inertia at the team's initial configuration,
+    so that they suit a shoulder and a wrist alike and stay slow against the ticks.
 
     Args:
         team: The robots, with their limits.
-        settings: Thresholds and gains.
-        initial_regularity: Regularity at the team's initial configuration.
+        settings: Margins and rates.
     """
 
-    def __init__(self, team: Team, settings: SafetySettings, initial_regularity: float) -> None:
-        self._team, self._settings = team, settings
-        self._scale = initial_regularity
-        self._regular = team.q0
+    def __init__(self, team: Team, settings: SafetySettings) -> None:
+        self._team = team
+        self._torque_rate = settings.torque_rate
         self._last_torque: Array | None = None
+        M = team.state(team.q0, np.zeros(team.n)).M
+        inertia = 1.0 / np.diag(np.linalg.inv(M))  # Of a joint when all others are free.
+        self._stiffness = settings.position_rate**2 * inertia
+        self._damping = 2.0 * settings.position_rate * inertia
+        self._braking = settings.velocity_rate * inertia
         lower, upper = team.position_limits
-        self._bounded = bool(np.isfinite(team.position_limits).any())
         # Two margins never overlap, however narrow the range of a joint is.
         margin = np.minimum(settings.position_margin, 0.25 * (upper - lower))
-        self._margin = np.where(np.isfinite(margin), margin, settings.position_margin)
-        self._lower, self._upper = lower + self._margin, upper - self._margin
+        self._margin = np.maximum(margin, 1e-9)
+        self._lower, self._upper = lower + margin, upper - margin
+        self._bounded = bool(np.isfinite(team.position_limits).any())
+        self._limited = bool(np.isfinite(team.effort_limits).any())
         self._fast = bool(np.isfinite(team.velocity_limits).any())
 
     def reset(self) -> None:
         """Forgets the last torque, as when the team starts anew."""
         self._last_torque = None
 
-    def blend(self, q: Array, v: Array, wanted: Array, S: Array) -> tuple[Array, float, float]:
-        """Joint acceleration near singularities, shape (n,).
-
-        The law fades out continuously as the regularity falls; in its place the team is pulled
-        back, damped, to the last configuration that was regular, and so leaves by itself.
-
-        Args:
-            q: Configuration, shape (nq,).
-            v: Velocity, shape (n,).
-            wanted: What the law asks for, shape (n,).
-            S: Inverse of the task Jacobian, shape (n, n).
-
-        Returns:
-            The acceleration, the share of the law and the relative regularity.
-        """
-        relative = regularity(S) / self._scale
-        begin, end = self._settings.singularity_begin, self._settings.singularity_end
-        if relative >= begin:
-            self._regular = q
-            return wanted, 1.0, relative
-        progress = np.clip((relative - end) / (begin - end), 0.0, 1.0)
-        share = float(progress**2 * (3.0 - 2.0 * progress))
-        pull = self._settings.recovery_stiffness * self._team.difference(q, self._regular)
-        recovery = pull - self._settings.recovery_damping * v
-        if share == 0.0:
-            return recovery, 0.0, relative
-        return share * wanted + (1.0 - share) * recovery, share, relative
-
     def protect(
-        self, q: Array, v: Array, torque: Array, gravity: Array, step: float
+        self, q: Array, v: Array, torque: Array, gravity: Array, elapsed: float
     ) -> tuple[Array, SafetyReport]:
-        """Torque within the limits of the joints, shape (n,).
+        """Torque within the limits of the joints, shape (n,); always finite.
 
-        Position limits repel by a potential with damping and velocity limits damp, both passive.
-        The change and the size of the torque are bounded by shrinking it towards the last torque
-        and towards gravity, so that its direction is kept.
+        The law's torque is shrunk towards gravity until it fits the effort limits, so that its
+        direction is kept; then joints near their position limits are repelled and joints that
+        are too fast are braked, both passively; at last the change since the last tick is shrunk
+        until it fits the rate limit. A torque that is not finite is replaced by gravity and the
+        robots' brakes.
 
         Args:
             q: Configuration, shape (nq,).
             v: Velocity, shape (n,).
             torque: What the law asks for, shape (n,) [N or N m].
             gravity: Gravity torque, shape (n,) [N or N m].
-            step: Time since the last tick [s]; 0 at a start.
+            elapsed: Time since the last torque [s].
         """
+        finite = bool(np.isfinite(torque).all())
+        if not finite:
+            torque = gravity - self._team.brake_damping * v
+        torque, effort_share = self._within_efforts(torque, gravity)
         repulsion, repelled = self._repulsion(q, v)
-        braking, too_fast = self._braking(v)
+        brake, too_fast = self._brake(v)
+        clipped = False
         if repelled or too_fast:
-            torque = torque + repulsion + braking
+            torque = torque + repulsion + brake
+            within = np.clip(torque, -self._team.effort_limits, self._team.effort_limits)
+            clipped, torque = bool((within != torque).any()), within
         rate_share = 1.0
-        rate = self._settings.torque_rate
-        if rate > 0.0 and step > 0.0 and self._last_torque is not None:
+        if self._torque_rate > 0.0 and self._last_torque is not None:
             change = torque - self._last_torque
-            rate_share = _share(change, np.full_like(change, rate * step))
+            room = np.full_like(change, self._torque_rate * elapsed)
+            rate_share = _share(change, -room, room)
             if rate_share < 1.0:
                 torque = self._last_torque + rate_share * change
-        room = np.maximum(self._team.effort_limits - np.abs(gravity), 0.0)
-        effort_share = _share(torque - gravity, room)
-        if effort_share < 1.0:
-            torque = gravity + effort_share * (torque - gravity)
-            torque = np.clip(torque, -self._team.effort_limits, self._team.effort_limits)
         self._last_torque = torque
-        report = SafetyReport(effort_share, rate_share, repelled, too_fast)
-        return torque, report
+        return torque, SafetyReport(effort_share, rate_share, repelled, too_fast, finite, clipped)
+
+    def _within_efforts(self, torque: Array, gravity: Array) -> tuple[Array, float]:
+        if not self._limited:
+            return torque, 1.0
+        limits = self._team.effort_limits
+        if not (np.abs(torque) > limits).any():
+            return torque, 1.0
+        holding = np.clip(gravity, -limits, limits)
+        share = _share(torque - holding, -limits - holding, limits - holding)
+        return np.clip(holding + share * (torque - holding), -limits, limits), share
 
     def _repulsion(self, q: Array, v: Array) -> tuple[Array, tuple[int, ...]]:
+        """-dV/dq - d(q) v with V = k depth^2 / 2 of the depth in the margin, shape (n,)."""
+        none = np.zeros_like(v)
         if not self._bounded:
-            return np.zeros_like(v), ()
+            return none, ()
         position = self._team.joints_from_configuration(q)
-        inside = np.clip(position, self._lower, self._upper)
-        depth = position - inside
+        depth = _beyond(position, self._lower, self._upper)
         if not depth.any():
-            return np.zeros_like(v), ()
-        damping = self._settings.position_damping * np.minimum(np.abs(depth) / self._margin, 1.0)
-        torque = -self._settings.position_stiffness * depth - damping * v
+            return none, ()
+        damping = self._damping * np.minimum(np.abs(depth) / self._margin, 1.0)
+        torque = -self._stiffness * depth - damping * v
         return torque, tuple(np.flatnonzero(depth).tolist())
 
-    def _braking(self, v: Array) -> tuple[Array, tuple[int, ...]]:
+    def _brake(self, v: Array) -> tuple[Array, tuple[int, ...]]:
+        none = np.zeros_like(v)
         if not self._fast:
-            return np.zeros_like(v), ()
+            return none, ()
         limits = self._team.velocity_limits
-        excess = v - np.clip(v, -limits, limits)
-        return -self._settings.velocity_damping * excess, tuple(np.flatnonzero(excess).tolist())
+        excess = _beyond(v, -limits, limits)
+        if not excess.any():
+            return none, ()
+        return -self._braking * excess, tuple(np.flatnonzero(excess).tolist())
 
 
-def _share(vector: Array, room: Array) -> float:
-    """Largest share of a vector, at most 1, that fits into room to both sides."""
-    size = np.abs(vector)
-    over = size > room
-    return float(np.min(room[over] / size[over])) if over.any() else 1.0
+def _beyond(values: Array, lower: Array, upper: Array) -> Array:
+    """How far values are beyond bounds, shape (n,); zero between them."""
+    return np.minimum(values - lower, 0.0) + np.maximum(values - upper, 0.0)
+
+
+def _share(vector: Array, lower: Array, upper: Array) -> float:
+    """Largest share of a vector, at most 1, that lies between bounds around zero."""
+    bound = np.where(vector > 0.0, upper, lower)
+    over = np.abs(vector) > np.abs(bound)
+    return float(np.min(bound[over] / vector[over])) if over.any() else 1.0

@@ -11,18 +11,15 @@ from noninteract_ros.control.decoupling import (
     TaskDynamics,
     TaskError,
     commanded_acceleration,
-    inverse,
     joint_acceleration,
     task_dynamics,
     task_terms,
 )
 from noninteract_ros.control.energy import Energy, energy
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
-from noninteract_ros.control.joint_safety import (
-    JointSafety,
-    SafetySettings,
-    regularity,
-)
+from noninteract_ros.control.joint_safety import JointSafety
+from noninteract_ros.control.safety_settings import SafetySettings
+from noninteract_ros.control.singularity import SingularityGuard, best_regularity
 from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
 from noninteract_ros.control.tick import Mode, Tick
 from noninteract_ros.last_call import LastCall
@@ -74,8 +71,8 @@ class TeamController:
         self._bump, self._bump_start = np.zeros(team.n), -np.inf
         self._last: tuple[float, Array] | None = None
         self._terms = LastCall(task_terms)
-        initial = self.stack.evaluate(team.state(team.q0, np.zeros(team.n)))
-        self._safety = JointSafety(team, safety, regularity(inverse(initial.J)))
+        self._guard = SingularityGuard(team, safety, best_regularity(team, stack))
+        self._safety = JointSafety(team, safety)
 
     @property
     def mode(self) -> Mode:
@@ -115,6 +112,7 @@ class TeamController:
         """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
         self._last = None
         self._bump_start = -np.inf
+        self._guard.reset()
         self._safety.reset()
         for item in self.inputs.values():
             item.reset()
@@ -134,11 +132,14 @@ class TeamController:
         state = self.team.state(q, v)
         task = self.stack.evaluate(state)
         restarted = self._restart_reason(now, q, v)
-        step = 0.0 if restarted or self._last is None else now - self._last[0]
+        elapsed = 0.0 if self._last is None else now - self._last[0]
+        step = 0.0 if restarted else elapsed
         # At the tick of a stop the inputs still count, so that the torque starts without a step.
         stopped = self._mode.stopped and (self._left is None or self._left.stopped)
         if restarted or stopped or (self._left and self._left.stopped):
             self._rest_at(task.x)
+        if restarted:
+            self._guard.reset()
         led = tuple(
             item.resting(now) if stopped else item.advance(now, step)
             for item in self.inputs.values()
@@ -153,11 +154,12 @@ class TeamController:
             self.stack.slices,
             self._mode.impedance.inertias,
         )
-        acceleration = self._acceleration(now, state, task, error, dynamics)
-        wanted = joint_acceleration(dynamics, v, acceleration)
-        wanted, law_share, regular = self._safety.blend(q, v, wanted, dynamics.S)
-        torque = self.team.inverse_dynamics(q, v, wanted)
-        torque, safety = self._safety.protect(q, v, torque, state.g, step)
+        relative = self._guard.relative(dynamics.S)
+        share = self._guard.law_share(relative)
+        recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
+        acceleration, wanted = self._blended(now, state, task, error, dynamics, share, recovery)
+        asked = self.team.inverse_dynamics(q, v, wanted)
+        torque, safety = self._safety.protect(q, v, asked, state.g, elapsed)
         self._last = (now, q)
         x_rate = error.e_rate + error.reference_velocity
         feedback = self._mode.impedance.damping * error.e_rate + self._mode.impedance.force(
@@ -173,14 +175,17 @@ class TeamController:
             dynamics,
             acceleration,
             feedback,
-            law_share,
-            regular,
+            share,
+            relative,
+            torque - asked,
             safety,
             restarted,
         )
 
     def energy(self, tick: Tick, external_torque: Array) -> Energy:
         """Storage functions (32) and their rates (33) of a tick.
+
+        What the limits of the joints add to the torque acts on the subtasks as if from outside.
 
         Args:
             tick: What `step` returned.
@@ -191,7 +196,7 @@ class TeamController:
             tick.error,
             self._mode.impedance,
             tick.task_acceleration,
-            external_torque,
+            external_torque + tick.added_torque,
         )
 
     def _restart_reason(self, now: float, q: Array, v: Array) -> str:
@@ -209,6 +214,27 @@ class TeamController:
     def _rest_at(self, x: Array) -> None:
         for item, part in zip(self.inputs.values(), self.stack.value_slices, strict=True):
             item.rest_at(x[part])
+
+    def _blended(
+        self,
+        now: float,
+        state: TeamState,
+        task: SubtaskState,
+        error: TaskError,
+        dynamics: TaskDynamics,
+        share: float,
+        recovery: Array,
+    ) -> tuple[Array, Array]:
+        """Task and joint acceleration of law and recovery together, shape (n,) each."""
+        if share == 0.0:  # The law is not even defined at a singularity; what fades starts over.
+            self._left, self._bump_start = None, -np.inf
+            return task.J @ recovery + task.J_rate @ state.v, recovery
+        acceleration = self._acceleration(now, state, task, error, dynamics)
+        wanted = joint_acceleration(dynamics, state.v, acceleration)
+        if share == 1.0:
+            return acceleration, wanted
+        wanted = share * wanted + (1.0 - share) * recovery
+        return task.J @ wanted + task.J_rate @ state.v, wanted
 
     def _acceleration(
         self,

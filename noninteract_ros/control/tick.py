@@ -39,12 +39,13 @@ class Tick:
         error: Tracking state of the subtasks.
         led: What each subtask is asked to do.
         dynamics: Task dynamics at the state.
-        task_acceleration: Commanded task acceleration, shape (n,) [m/s^2].
+        task_acceleration: Commanded task acceleration, of law and recovery, shape (n,) [m/s^2].
         feedback: Coupling force D e_rate + h(e) of each subtask, which an operator's device
             feels, shape (n,) [N].
         law_share: Share of the law in the joint acceleration; below 1 near a singularity.
-        regularity: Regularity of the task Jacobian, relative to the initial one.
-        safety: What the limits of the joints took or added.
+        regularity: Regularity of the task Jacobian, relative to the team's best.
+        added_torque: What the limits of the joints added to the torque, shape (n,) [N or N m].
+        safety: Why they did.
         restarted: Why every subtask was put to rest where it is, or an empty text.
     """
 
@@ -59,5 +60,11 @@ class Tick:
     feedback: Array
     law_share: float
     regularity: float
+    added_torque: Array
     safety: SafetyReport
     restarted: str
+
+    @property
+    def intervened(self) -> bool:
+        """Whether the torque is another one than the law's."""
+        return self.law_share < 1.0 or self.safety.acted

@@ -59,6 +59,7 @@ class Controller(ScenarioNode):
         self._cycle_times: deque[float] = deque(maxlen=1000)
         self._restart = ""
         self._silent: dict[str, bool] = {}
+        self._conditions: list[str] = []
         self._command_to = self.create_publisher(JointState, "joint_commands", LOOP_QOS)
         self._telemetry = Telemetry(self, team, stack)
         self._live = LiveParameters(self, self.core, self._post)
@@ -200,12 +201,15 @@ class Controller(ScenarioNode):
         self._command_to.publish(command)
         self._answered = (stamp, command)
         silent = {name: led.silent for name, led in zip(self.core.inputs, tick.led, strict=True)}
-        self._note(tick.restarted, silent)
         self._telemetry.publish(stamp, self.core, tick)
+        self._note(tick.restarted, silent, self._telemetry.safety.conditions(seconds(stamp)))
         self._cycle_times.append(time.perf_counter() - began)
 
-    def _note(self, restarted: str, silent: dict[str, bool]) -> None:
-        """Logs what changed: a new start, a source that went silent or came back."""
+    def _note(self, restarted: str, silent: dict[str, bool], conditions: list[str]) -> None:
+        """Logs what changed: a new start, a source that went silent or came back, limits."""
+        if conditions != self._conditions:
+            self._conditions = conditions
+            self.get_logger().warning("; ".join(conditions) or "within all limits again")
         if restarted:
             self._restart = restarted
             self.get_logger().info(f"every subtask holds where it is: {restarted}")
@@ -265,6 +269,8 @@ class Controller(ScenarioNode):
             return Level.WARN, f"waiting for {', '.join(self._missing)}", values
         if self._watch.absent:
             return Level.WARN, f"running without {', '.join(sorted(self._watch.absent))}", values
+        if conditions := self._telemetry.safety.conditions(self._now):
+            return Level.WARN, "; ".join(conditions), values
         silent_ones = [name for name, is_silent in self._silent.items() if is_silent]
         if silent_ones:
             return Level.WARN, f"holding {', '.join(silent_ones)}: source silent", values
@@ -272,14 +278,16 @@ class Controller(ScenarioNode):
 
 
 def _reference(parsed: ParsedReference | Marker, dim: int) -> tuple[int, Motion | None]:
-    """What a source asks for: full, shaped where it lacks derivatives, or nothing (a marker)."""
+    """What a source asks for: a motion, a set-point where it gives no velocity, or nothing.
+
+    A motion without acceleration is followed by its position and velocity alone.
+    """
     if isinstance(parsed, Marker):
         return parsed.stamp_ns, None
-    if parsed.velocity is not None and parsed.acceleration is not None:
-        motion = Reference(parsed.position, parsed.velocity, parsed.acceleration)
-        return parsed.stamp_ns, motion
-    velocity = np.zeros(dim) if parsed.velocity is None else parsed.velocity
-    return parsed.stamp_ns, Target(parsed.position, velocity)
+    if parsed.velocity is None:
+        return parsed.stamp_ns, Target(parsed.position, np.zeros(dim))
+    acceleration = np.zeros(dim) if parsed.acceleration is None else parsed.acceleration
+    return parsed.stamp_ns, Reference(parsed.position, parsed.velocity, acceleration)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,6 +9,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.clock import seconds
+from noninteract_ros.control.safety_watch import SafetyWatch
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.lockstep import StampOrder, state_lead
@@ -17,7 +18,7 @@ from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
-ENERGY_LABELS = ("time", "storage", "rate", "supplied", "dissipated")
+ENERGY_LABELS = ("time", "storage", "rate", "supplied", "dissipated", "interventions")
 
 
 class Telemetry:
@@ -27,6 +28,9 @@ class Telemetry:
         node: The controller's node.
         team: The robots.
         stack: Their subtasks.
+
+    Attributes:
+        safety: What to tell of singularities and joint limits.
     """
 
     def __init__(self, node: ScenarioNode, team: Team, stack: SubtaskStack) -> None:
@@ -37,6 +41,7 @@ class Telemetry:
         self._lockstep = node.lockstep
         self._answered = 0
         self._tick: Tick | None = None
+        self.safety = SafetyWatch(team.joint_names)
         self._wrenches = np.zeros((len(team.names), 6))
         self._order, self._lead = StampOrder(), state_lead(general.rate)
         self._wrench_stamps = dict.fromkeys(general.force_sensors, -1)
@@ -70,6 +75,7 @@ class Telemetry:
     def forget(self) -> None:
         """Forgets the wrenches that have come so far."""
         self._order.forget()
+        self.safety.reset()
         self._wrench_stamps = dict.fromkeys(self._wrench_stamps, -1)
 
     def missing(self, stamp: int) -> list[str]:
@@ -83,6 +89,7 @@ class Telemetry:
     def publish(self, stamp: int, core: TeamController, tick: Tick) -> None:
         """Tells of a tick, stamped as the state that it answered [ns]."""
         self._tick = tick
+        self.safety.note(seconds(stamp), tick)
         slices = self._stack.slices
         for i, publisher in self._feedback_to.items():
             feedback = tick.feedback[slices[i]]
@@ -100,11 +107,11 @@ class Telemetry:
             self._desired_to[i].publish(
                 codec.encode(stamp, wanted.position, wanted.velocity, wanted.acceleration)
             )
-            account = np.concatenate(([seconds(stamp)], accounts[i]))
+            account = np.array([seconds(stamp), *accounts[i], self.safety.interventions])
             self._energy_to[i].publish(self._energy_codec.encode(account))
 
     def condition(self) -> dict[str, object]:
-        """Smallest singular value of the stacked Jacobian and largest tracking error."""
+        """Smallest singular value of the stacked Jacobian, tracking errors, shares of the law."""
         if self._tick is None:
             return {}
         values: dict[str, object] = {
@@ -114,4 +121,5 @@ class Telemetry:
         }
         for name, part in zip(self._stack.names, self._stack.slices, strict=True):
             values[f"{name} error"] = float(np.abs(self._tick.error.e[part]).max())
+        values |= self.safety.values()
         return values

@@ -2,16 +2,33 @@
 """Team and passive bodies as one Pinocchio model, with the couplings between them."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.simulation.contact import Coupling, Effect, FrameMotion
+from noninteract_ros.simulation.push import Push
 from noninteract_ros.team.joining import append_model
 from noninteract_ros.team.team import Team
 
 AXES = pin.LOCAL_WORLD_ALIGNED
+
+
+@dataclass(frozen=True, slots=True)
+class Outside:
+    """What acts on a plant besides controls, gravity and friction.
+
+    Attributes:
+        coupling_torque: Generalised force of all couplings, shape (nv,) [N or N m].
+        push_torque: Generalised force of all pushes, shape (nv,) [N or N m].
+        effects: What each coupling does.
+    """
+
+    coupling_torque: Array
+    push_torque: Array
+    effects: tuple[Effect, ...]
 
 
 class Plant:
@@ -45,12 +62,12 @@ class Plant:
         self.q0[: len(team.q0)] = team.q0
         # On joints whose tangent space commutes, Runge-Kutta needs no correction.
         self._curved = any(joint.nv > 1 for joint in model.joints[1:])
+        self._numbers = {frame.name: number for number, frame in enumerate(model.frames)}
         self._frames = [[self._frame(name) for name in item.frames] for item in self.couplings]
+        self._tools = [f"{robot.name}/{robot.tool_frame}" for robot in team.robots]
 
     def _frame(self, name: str) -> int:
-        if not self.model.existFrame(name):
-            raise KeyError(f"the plant has no frame {name!r}")
-        return int(self.model.getFrameId(name))
+        return self._numbers[name]
 
     def integrate(self, q: Array, step: Array) -> Array:
         """Configuration reached from q along a tangent vector, shape (nv,)."""
@@ -62,15 +79,28 @@ class Plant:
             return v
         return pin.dDifference(self.model, q_0, q, pin.ARG1) @ v
 
-    def effects(self, q: Array, v: Array) -> list[Effect]:
-        """What each coupling does at a state of the plant."""
-        if not self.couplings:
-            return []
+    def outside(self, q: Array, v: Array, pushes: Sequence[Push] = ()) -> Outside:
+        """What couplings and pushes do at a state of the plant."""
+        none = np.zeros(self.model.nv)
+        if not self.couplings and not pushes:
+            return Outside(none, none, ())
         pin.forwardKinematics(self.model, self._data, q, v)
-        return [
-            coupling.effect(tuple(self._motion(frame) for frame in frames))
-            for coupling, frames in zip(self.couplings, self._frames, strict=True)
-        ]
+        pin.computeJointJacobians(self.model, self._data)
+        coupling_torque, effects = none.copy(), []
+        for coupling, frames in zip(self.couplings, self._frames, strict=True):
+            effect = coupling.effect(tuple(self._motion(frame) for frame in frames))
+            effects.append(effect)
+            for frame, wrench in zip(frames, effect.wrenches, strict=True):
+                if wrench.any():
+                    coupling_torque += self._jacobian(frame).T @ wrench
+        push_torque = none.copy()
+        for push in pushes:
+            wrench = self._in_world_axes(push)
+            push_torque += self._jacobian(self._frame(push.frame)).T @ wrench
+        return Outside(coupling_torque, push_torque, tuple(effects))
+
+    def _jacobian(self, frame: int) -> Array:
+        return pin.getFrameJacobian(self.model, self._data, frame, AXES).reshape(6, -1)
 
     def _motion(self, frame: int) -> FrameMotion:
         placement = pin.updateFramePlacement(self.model, self._data, frame)
@@ -82,26 +112,22 @@ class Plant:
             velocity.angular.copy(),
         )
 
-    def coupling_torque(self, q: Array, effects: Sequence[Effect]) -> Array:
-        """Generalised force of all couplings, shape (nv,)."""
-        total = np.zeros(self.model.nv)
-        if effects:
-            pin.computeJointJacobians(self.model, self._data, q)
-        for effect, frames in zip(effects, self._frames, strict=True):
-            for wrench, frame in zip(effect.wrenches, frames, strict=True):
-                if wrench.any():
-                    J = pin.getFrameJacobian(self.model, self._data, frame, AXES)
-                    total += J.T @ wrench
-        return total
+    def _in_world_axes(self, push: Push) -> Array:
+        if not push.in_frame_axes:
+            return push.wrench
+        R = pin.updateFramePlacement(self.model, self._data, self._frame(push.frame)).rotation
+        return np.concatenate([R @ push.wrench[:3], R @ push.wrench[3:]])
 
-    def tool_wrenches(self, effects: Sequence[Effect]) -> Array:
-        """Sum of the couplings' wrenches on each tool, world axes, shape (N, 6) [N, N m]."""
+    def tool_wrenches(self, q: Array, v: Array, pushes: Sequence[Push] = ()) -> Array:
+        """What couplings and pushes exert on each tool, world axes, shape (N, 6) [N, N m]."""
         wrenches = np.zeros((len(self.team.robots), 6))
-        tools = [f"{robot.name}/{robot.tool_frame}" for robot in self.team.robots]
+        effects = self.outside(q, v, pushes).effects
+        acting = [(push.frame, self._in_world_axes(push)) for push in pushes]
         for coupling, effect in zip(self.couplings, effects, strict=True):
-            for name, wrench in zip(coupling.frames, effect.wrenches, strict=True):
-                if name in tools:
-                    wrenches[tools.index(name)] += wrench
+            acting += zip(coupling.frames, effect.wrenches, strict=True)
+        for name, wrench in acting:
+            if name in self._tools:
+                wrenches[self._tools.index(name)] += wrench
         return wrenches
 
     def acceleration(self, q: Array, v: Array, torque: Array) -> Array:

@@ -8,10 +8,9 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
-from noninteract_ros.simulation.contact import Effect
 from noninteract_ros.simulation.integrator import runge_kutta_step
 from noninteract_ros.simulation.plant import Plant
-from noninteract_ros.simulation.push import RESOLUTION, LivePush, ScheduledPush
+from noninteract_ros.simulation.push import RESOLUTION, LivePush, Push, ScheduledPush
 from noninteract_ros.simulation.subtask_object import SubtaskObject
 
 
@@ -60,7 +59,8 @@ class TeamSimulation:
         pushes: Sequence[ScheduledPush] = (),
     ) -> None:
         self.plant, self.team, self.rate = plant, plant.team, rate
-        self._held, self._pushes = held, tuple(pushes)
+        self._held = held
+        self._scheduled = [(push, push.frame_name(plant.team)) for push in pushes]
         self._live: dict[str, LivePush] = {}
         self.tick = 0
         self._q: Array
@@ -103,7 +103,7 @@ class TeamSimulation:
         self._live.clear()
 
     def push(self, robot: str, wrench: Array, in_tool_axes: bool, duration: float) -> None:
-        """Pushes a robot for a while; a new push replaces its last one.
+        """Pushes the tool of a robot for a while; a new push replaces its last one.
 
         Args:
             robot: Name of the robot.
@@ -111,10 +111,13 @@ class TeamSimulation:
             in_tool_axes: Whether the wrench is given in tool axes instead of world axes.
             duration: Time after which it lapses [s].
         """
-        self._live[robot] = LivePush(wrench, in_tool_axes, self.now + duration - RESOLUTION)
+        tool = f"{robot}/{self.team.robots[self.team.index(robot)].tool_frame}"
+        push = Push(tool, wrench, in_tool_axes)
+        self._live[robot] = LivePush(push, self.now + duration - RESOLUTION)
 
     def step(self, torque: Array | None) -> None:
         """One tick under a control torque, shape (n,); None brakes by damping and gravity."""
+        pushes = self._acting()
 
         def applied(q: Array, v: Array) -> Array:
             if torque is not None:
@@ -122,7 +125,7 @@ class TeamSimulation:
             return self.team.gravity(q) - self.team.brake_damping * v
 
         def derivative(q: Array, v: Array) -> tuple[Array, Array]:
-            return self._derivative(q, v, applied(self._of_team(q), v[: self.team.n]))
+            return self._derivative(q, v, applied(self._of_team(q), v[: self.team.n]), pushes)
 
         self.torque = applied(self.q, self.v)
         step = 1.0 / self.rate
@@ -130,50 +133,37 @@ class TeamSimulation:
         self._work += work
         self.tick += 1
         if self._live:
-            self._live = {name: push for name, push in self._live.items() if push.until > self.now}
+            self._live = {name: live for name, live in self._live.items() if live.until > self.now}
+
+    def _acting(self) -> list[Push]:
+        """Pushes of the tick that begins now."""
+        pushes = [live.push for live in self._live.values()]
+        for scheduled, frame in self._scheduled:
+            wrench = scheduled.wrench(self.now)
+            if wrench.any():
+                pushes.append(Push(frame, wrench))
+        return pushes
 
     def _of_team(self, q: Array) -> Array:
         return q[: len(self.team.q0)]
 
-    def _derivative(self, q: Array, v: Array, torque: Array) -> tuple[Array, Array]:
+    def _derivative(
+        self, q: Array, v: Array, torque: Array, pushes: list[Push]
+    ) -> tuple[Array, Array]:
         """Acceleration of the plant, and the powers of controls, pushes and losses."""
         n = self.team.n
-        effects = self.plant.effects(q, v)
-        load = self.plant.coupling_torque(q, effects) - self.plant.friction * v
+        outside = self.plant.outside(q, v, pushes)
+        resistance = self.plant.friction * v
+        load = outside.coupling_torque + outside.push_torque - resistance
         load[:n] += torque
-        lost = float(v @ (self.plant.friction * v)) + sum(item.dissipated for item in effects)
-        outside = 0.0
-        if self._pushed():
-            state = self.team.state(self._of_team(q), v[:n])
-            pushing = self.team.external_torque(state, self._push_wrenches(state.tool_rotations))
-            load[:n] += pushing
-            outside = float(pushing @ v[:n])
+        lost = float(resistance @ v) + sum(effect.dissipated for effect in outside.effects)
+        pushed = float(outside.push_torque @ v)
         if self._held is None:
             acceleration = self.plant.acceleration(q, v, load)
         else:
-            acceleration, holding = self._held.accelerate(
-                self.team.state(self._of_team(q), v[:n]), load
-            )
-            outside += float(holding @ v[:n])
-        return acceleration, np.array([float(torque @ v[:n]), outside, lost])
-
-    def _pushed(self) -> bool:
-        return bool(self._live) or any(push.wrench(self.now).any() for push in self._pushes)
-
-    def _push_wrenches(self, rotations: Array) -> Array:
-        """Pushes on each tool now, world axes, shape (N, 6) [N, N m].
-
-        Args:
-            rotations: Tool orientations, shape (N, 3, 3).
-        """
-        wrenches = np.zeros((len(self.team.names), 6))
-        for push in self._pushes:
-            wrenches[self.team.index(push.robot)] += push.wrench(self.now)
-        for name, live in self._live.items():
-            i = self.team.index(name)
-            R = rotations[i] if live.in_tool_axes else np.eye(3)
-            wrenches[i] += np.concatenate([R @ live.wrench[:3], R @ live.wrench[3:]])
-        return wrenches
+            acceleration, holding = self._held.accelerate(self.team.state(q, v), load)
+            pushed += float(holding @ v)
+        return acceleration, np.array([float(torque @ v[:n]), pushed, lost])
 
     def external_wrenches(self) -> Array:
         """What acts on each tool from outside, under the last control torque, shape (N, 6).
@@ -181,24 +171,19 @@ class TeamSimulation:
         World axes, at the tool point [N, N m]. What an object at subtask level exerts is reported
         as the smallest wrench on each tool that has its joint torque.
         """
-        wrenches = self.plant.tool_wrenches(self._effects())
-        if self._pushed():
-            wrenches += self._push_wrenches(self.team.tool_rotations(self.q))
+        q, v, pushes = self._q, self._v, self._acting()
+        wrenches = self.plant.tool_wrenches(q, v, pushes)
         if self._held is not None:
-            state = self.team.state(self.q, self.v)
-            load = self.torque - self.team.friction * self.v
-            if self._pushed():
-                pushes = self._push_wrenches(state.tool_rotations)
-                load = load + self.team.external_torque(state, pushes)
-            _, holding = self._held.accelerate(state, load)
+            outside = self.plant.outside(q, v, pushes)
+            load = outside.coupling_torque + outside.push_torque - self.plant.friction * v
+            state = self.team.state(q, v)
+            _, holding = self._held.accelerate(state, load + self.torque)
             wrenches += self.team.tool_wrenches(state, holding)
         return wrenches
-
-    def _effects(self) -> list[Effect]:
-        return self.plant.effects(self._q, self._v)
 
     def energy(self) -> EnergyBalance:
         """The balance since the start or the last reset."""
         stored = self.plant.mechanical_energy(self._q, self._v)
-        stored += sum(effect.potential for effect in self._effects())
+        effects = self.plant.outside(self._q, self._v).effects
+        stored += sum(effect.potential for effect in effects)
         return EnergyBalance(stored, *self._work.tolist())

@@ -54,6 +54,7 @@ class PlanarArm(ArmSettings):
         links = zip(self.link_lengths, self.link_masses, strict=True)
         for number, (length, mass) in enumerate(links, start=1):
             parent = model.addJoint(parent, pin.JointModelRZ(), place, f"joint_{number}")
+            model.addJointFrame(parent)  # So that people can push the elbow.
             model.appendBodyToJoint(parent, self._body(length, mass), pin.SE3.Identity())
             place = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
         model.addFrame(pin.Frame(TOOL, parent, place, pin.FrameType.OP_FRAME))

@@ -104,6 +104,7 @@ class _Recording:
         self._joints = JointStateCodec(team.joint_names)
         self._codecs = [SubtaskCodec(t.name, t.elements, t.axes) for t in stack.subtasks]
         self._energy = EnergyCodec(ENERGY_LABELS)
+        self._interventions = 0
         self._narrators = []
         if scenario.haptic:
             device = scenario.build_haptic(stack)
@@ -127,6 +128,7 @@ class _Recording:
             q, v, effort = simulation.q, simulation.v, simulation.torque
             wrenches = simulation.external_wrenches()
             result = self._rehearsal.step()
+            self._interventions += result.intervened
             self._add(
                 "joint_states", JOINTS, now, lambda *a, t=now: self._joints.encode(t, *a),
                 q, v, effort,
@@ -175,7 +177,7 @@ class _Recording:
             )  # fmt: skip
             account = np.array(
                 [now / 1e9, energy.storage[i], energy.rate[i], energy.supplied[i],
-                 energy.dissipated[i]]
+                 energy.dissipated[i], self._interventions]
             )  # fmt: skip
             self._add(f"{codec.name}/energy", LABELLED, now, self._energy.encode, account)
 

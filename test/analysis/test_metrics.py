@@ -68,7 +68,7 @@ def nudge(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]
 
 def negative(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
     if topic == "relative/energy" and time > 1.0:
-        arrays[0] = arrays[0] - [0.0, 1.0, 0.0, 0.0, 0.0]
+        arrays[0] = arrays[0] - [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
     return arrays
 
 
@@ -80,7 +80,7 @@ def not_a_number(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.n
 
 def pumped(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
     if topic == "relative/energy":
-        arrays[0] = arrays[0] + [0.0, 0.5 * time, 0.0, 0.0, 0.0]
+        arrays[0] = arrays[0] + [0.0, 0.5 * time, 0.0, 0.0, 0.0, 0.0]
     return arrays
 
 
@@ -110,7 +110,7 @@ def test_storage_without_disturbance_never_grows(tmp_path: Path) -> None:
 
     def grow(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         if topic == "relative/energy" and time > 0.6:
-            arrays[0] = arrays[0] + [0.0, 0.5, 0.0, 0.0, 0.0]
+            arrays[0] = arrays[0] + [0.0, 0.5, 0.0, 0.0, 0.0, 0.0]
         return arrays
 
     broken = checks(findings(tmp_path, grow, **quiet))
