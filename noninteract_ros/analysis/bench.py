@@ -24,7 +24,6 @@ from noninteract_ros.scenario_file import config_folders, find_scenario, read_pa
 
 BATCH = 50  # calls of one thing before the other thing has its turn
 WARM_UP = 20  # calls that are not counted
-FORMATION = 30  # robots
 PARTS = ("law", "node", "lockstep", "wall")
 PACKAGES = ("numpy", "pin", "ros-jazzy-rclpy")
 
@@ -98,37 +97,10 @@ def take_turns(things: Mapping[str, Timed], count: int) -> dict[str, Array]:
     return {name: np.array(found) for name, found in times.items()}
 
 
-def formation(count: int) -> dict[str, Any]:
-    """Values of a scenario: unlike point masses in space that keep the places they start at."""
-    names = [f"robot_{i + 1}" for i in range(count)]
-    robots = {
-        name: {
-            "model": "point_mass",
-            "axes": ["x", "y", "z"],
-            "mass": 1.0 + i % 3,
-            "initial_position": [float(i % 6), float(i // 6), 0.0],
-        }
-        for i, name in enumerate(names)
-    }
-    subtasks = {
-        name: {"kind": f"{name}_position", "stiffness": [50.0], "damping": [25.0]}
-        for name in ("cooperative", "relative")
-    }
-    return {"robots": names, **robots, "subtasks": list(subtasks), **subtasks}
-
-
 def bench_scenarios() -> dict[str, dict[str, Any]]:
-    """Values of the scenarios whose law is timed: the paper's, a formation, all with arms."""
-    scenarios = {
-        "paper": read_parameters(find_scenario("paper")),
-        f"formation of {FORMATION}": formation(FORMATION),
-    }
-    for file in sorted(file for folder in config_folders() for file in folder.glob("*.yaml")):
-        values = read_parameters(file)
-        blocks = [values.get(name, {}) for name in values.get("robots", ())]
-        if any(block.get("model", "point_mass") != "point_mass" for block in blocks):
-            scenarios.setdefault(file.stem, values)
-    return scenarios
+    """Values of all scenarios of the package, by name."""
+    files = {file.stem: file for folder in config_folders() for file in folder.glob("*.yaml")}
+    return {name: read_parameters(find_scenario(name)) for name in sorted(files)}
 
 
 @dataclass(frozen=True)
@@ -216,8 +188,13 @@ def machine() -> dict[str, Any]:
         "system": f"{platform.system()} {platform.release()}",
         "python": platform.python_version(),
         **{name: _version(name) for name in PACKAGES},
-        "load average": [round(load, 2) for load in os.getloadavg()],
+        "load average before": load_average(),
     }
+
+
+def load_average() -> list[float]:
+    """Runnable tasks over the last 1, 5 and 15 minutes."""
+    return [round(load, 2) for load in os.getloadavg()]
 
 
 def _cpu() -> str:

@@ -60,7 +60,7 @@ class ControllerCycle:
         self._history = material.history
         self._joints = JointStateCodec(self._team.joint_names)
         self._codecs = {
-            task.name: SubtaskCodec(task.name, task.elements, task.axes)
+            task.name: SubtaskCodec(task.name, task.elements, task.axes, task.rotates)
             for task in self._stack.subtasks
         }
         file = parameter_file({**values, "lockstep": True}, folder)
