@@ -22,16 +22,16 @@ def tables(report: "Report") -> list[Table]:
 
 def checks_table(checks: tuple[Check, ...]) -> Table:
     """A row for each check; what does not apply says why."""
-    name, bound, unit, verdict = (
-        Column(title, no_wrap=True) for title in ("check", "bound", "unit", "")
-    )
-    table = Table(name, "found", bound, unit, verdict)
+    titles = ("check", "found", "bound", "unit", "")
+    table = Table(*(Column(title, no_wrap=True) for title in titles), caption_justify="left")
     words = {True: "[green]passed[/]", False: "[bold red]FAILED[/]", None: "[dim]n/a[/]"}
     for check in checks:
         sign = ">=" if check.at_least else "<="
-        found = f"[dim]{check.reason}[/]" if check.value is None else f"{check.value:.3g}"
         limit = f"{sign} {check.limit:.3g}"
+        found = _number(check.value)
         table.add_row(check.name, found, limit, check.unit, words[check.passed])
+    reasons = dict.fromkeys(check.reason for check in checks if check.passed is None)
+    table.caption = "\n".join(f"n/a: {reason}" for reason in reasons) or None
     return table
 
 
