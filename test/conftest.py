@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fixtures of all tests that need ROS."""
 
-import itertools
-import os
+import fcntl
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,16 +10,24 @@ from typing import TYPE_CHECKING
 import pytest
 
 if TYPE_CHECKING:
-    from harness import Programs, Ros
+    from harness import Ros
+    from programs import Programs
 
-WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
-DOMAINS = itertools.cycle(range(20 + WORKER % 4 * 10, 30 + WORKER % 4 * 10))
+DOMAINS = range(10, 60)  # Up to 101, ports stay below the ephemeral ones; other tests have theirs.
 
 
 @pytest.fixture
-def domain() -> int:
-    """A ROS domain that no other test uses at the same time."""
-    return next(DOMAINS)
+def domain() -> Iterator[int]:
+    """A ROS domain that no other test on this machine uses at the same time."""
+    for number in DOMAINS:
+        with Path(tempfile.gettempdir(), f"noninteract_ros_domain_{number}").open("w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            yield number
+            return
+    raise RuntimeError("all ROS domains for tests are in use")
 
 
 @pytest.fixture
@@ -35,7 +43,7 @@ def ros(domain: int) -> Iterator["Ros"]:
 @pytest.fixture
 def programs(tmp_path: Path, domain: int) -> Iterator["Programs"]:
     """A starter of programs in processes of their own."""
-    from harness import Programs
+    from programs import Programs
 
     starter = Programs(tmp_path, domain)
     yield starter

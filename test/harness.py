@@ -1,16 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes in this process, programs in processes of their own, and an ear for what they say."""
+"""Nodes in this process, and an ear for what they say."""
 
 import gc
 import os
-import signal
-import subprocess
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,7 +26,6 @@ from noninteract_ros.nodes.cdr import JointArrays, JointStateCodec
 from noninteract_ros.nodes.controller import Controller
 from noninteract_ros.nodes.haptic_emulator import HapticEmulator
 from noninteract_ros.nodes.node import ScenarioNode, spin
-from noninteract_ros.nodes.parameter_files import dump
 from noninteract_ros.nodes.program import until_shutdown
 from noninteract_ros.nodes.relative_planner import RelativePlanner
 from noninteract_ros.nodes.robot_team import RobotTeam
@@ -275,78 +270,3 @@ class Stack:
 def go(ros: Ros) -> None:
     """Lets a paused team go."""
     ros.call(SetBool, "robot_team/pause", SetBool.Request(data=False))
-
-
-class Programs:
-    """Programs as processes; all are ended by `close`.
-
-    Args:
-        folder: Where parameter files and logs go.
-        domain: Their ROS domain.
-    """
-
-    def __init__(self, folder: Path, domain: int) -> None:
-        self._folder = folder
-        self.environment = os.environ | {
-            "ROS_DOMAIN_ID": str(domain),
-            "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-            "OPENBLAS_NUM_THREADS": "1",
-        }
-        self.running: dict[str, subprocess.Popen[str]] = {}
-        self._started = 0
-
-    def start(self, name: str, values: Mapping[str, Any]) -> subprocess.Popen[str]:
-        """One of the stack's programs, with a scenario."""
-        file = self._folder / "scenario.yaml"
-        file.write_text(dump({"/**": {"ros__parameters": dict(values)}}))
-        parameters = ["--ros-args", "--params-file", str(file)]
-        return self.python(name, "-m", f"noninteract_ros.nodes.{name}", *parameters)
-
-    def python(self, name: str, *arguments: str) -> subprocess.Popen[str]:
-        """A Python program."""
-        self._started += 1
-        with self._log(name).open("a") as log:
-            process = subprocess.Popen(
-                [sys.executable, *arguments],
-                env=self.environment,
-                cwd=ROOT,
-                stdout=log,
-                stderr=log,
-                text=True,
-            )
-        self.running[name] = process
-        return process
-
-    def start_all(self, names: Sequence[str], values: Mapping[str, Any], ear: Ear) -> None:
-        """Starts programs and waits until each has found all its subscribers."""
-        for name in names:
-            self.start(name, values)
-        until(lambda: all(self._matched(ear, name) for name in names), f"{names} are ready")
-
-    def _matched(self, ear: Ear, name: str) -> bool:
-        assert self.running[name].poll() is None, self.log(name)
-        entries = ear.status.get(name, (0, "", {}))[2].get("subscribers", "").split(", ")
-        counts = [entry.rpartition(" ") for entry in entries]
-        return len(counts) > 1 and all(
-            int(count) == ear.node.count_subscribers(topic)
-            for topic, _, count in counts
-            if topic.startswith("/team/")
-        )
-
-    def _log(self, name: str) -> Path:
-        return self._folder / f"{name}.log"
-
-    def log(self, name: str) -> str:
-        """What a program has printed."""
-        return self._log(name).read_text()
-
-    def kill(self, name: str) -> None:
-        """Ends a program as `kill -9` does."""
-        process = self.running.pop(name)
-        process.send_signal(signal.SIGKILL)
-        process.wait(DEADLINE)
-
-    def close(self) -> None:
-        """Ends all programs."""
-        for name in list(self.running):
-            self.kill(name)

@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from harness import Ear, Programs, Ros, paper, until
+from harness import Ear, Ros, paper, until
+from programs import Programs
 
 NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
 RATE = 100.0

@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from harness import Programs, Ros, go, paper, until
+from harness import Ros, go, paper, until
+from programs import Programs
 
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.rehearsal import rehearse

@@ -3,7 +3,8 @@
 
 import numpy as np
 import pytest
-from harness import Programs, Ros, paper, until
+from harness import Ros, paper, until
+from programs import Programs
 
 PLACE = (0.25, -0.15)
 # What a person at a terminal can do: no stamp, no clock of the team, ten times a second.

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 import yaml
-from harness import DEADLINE, Programs, Ros, flat, paper, until
+from harness import DEADLINE, Ros, flat, paper, until
+from programs import Programs
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 from repository import ROOT
