@@ -29,20 +29,29 @@ $(BIN)/python:
 	is needed, but PYTHON=$(PYTHON) says: $(shell $(PYTHON) --version 2>&1 || :)))
 	$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
-# A stamp per kind of install; the one for development holds everything of the other.
+# A stamp per kind of install; the one for development holds everything of the others.
 $(VENV)/installed: $(METADATA) | $(BIN)/python
 	@echo "Installing into $(VENV): about a minute and 1 GB the first time"
 	$(PIP_INSTALL) --editable .
 	@touch $@
 
+$(VENV)/installed-robots: $(VENV)/installed
+	@echo "Installing models of robots into $(VENV): about a minute and 0.5 GB the first time"
+	$(PIP_INSTALL) --editable '.[robots]'
+	@touch $@
+
 $(VENV)/installed-dev: $(METADATA) | $(BIN)/python
 	@echo "Installing into $(VENV): about a minute and 1.5 GB the first time"
 	$(PIP_INSTALL) --editable '.[dev]'
-	@touch $(VENV)/installed $@
+	@touch $(VENV)/installed $(VENV)/installed-robots $@
 
 venv: $(VENV)/installed-dev ## make .venv with the package (editable) and the developers' tools
 
-demo: $(VENV)/installed ## run a scenario: make demo SCENARIO=paper ARGS='--duration 6'
+# A scenario that names the models of example-robot-data needs the extra that brings them.
+SCENARIO_FILE = $(firstword $(wildcard $(SCENARIO) config/$(SCENARIO).yaml))
+NEEDS_ROBOTS = $(if $(SCENARIO_FILE),$(shell grep -l example-robot-data $(SCENARIO_FILE)))
+
+demo: $(VENV)/installed$(if $(NEEDS_ROBOTS),-robots) ## run a scenario: make demo SCENARIO=paper ARGS='--duration 6'
 	$(BIN)/noninteract demo $(SCENARIO) $(ARGS)
 
 test: lint ## format check, lint, types and all tests
