@@ -68,7 +68,7 @@ def at_a_door(rate: float) -> TeamSimulation:
 
 def in_a_wall(rate: float) -> TeamSimulation:
     """Arms whose tools are and stay in a soft, tilted wall."""
-    wall = Wall("wall", (0.0, 0.0, 0.1), (0.1, 0.0, 1.0), 30.0, 0.2)
+    wall = Wall("wall", (0.0, 0.0, 0.1), (0.1, 0.0, 1.0), 12.0, 0.2)
     simulation = TeamSimulation(plant_of(arms(), wall=wall), rate)
     simulation.q = np.array([-1.4, 1.2, -0.9, -1.8])
     return simulation
