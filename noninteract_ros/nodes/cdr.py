@@ -19,6 +19,7 @@ from noninteract_ros.errors import InputError, one_of
 
 Message = TypeVar("Message")
 SECOND = 10**9
+LARGEST = 1e9  # in any unit
 QUANTITIES = ("position", "velocity", "effort")
 ENCAPSULATION = b"\x00\x01\x00\x00"  # plain CDR, little-endian, no options
 STAMP = struct.Struct("<iI")
@@ -50,18 +51,18 @@ def deserialize(data: bytes, message_type: type[Message]) -> Message:
 
 
 def check_finite(values: Array, label: Callable[[int], str]) -> None:
-    """Refuses NaN and infinity.
+    """Refuses NaN, infinity, and numbers that no robot means but that would overflow torques.
 
     Args:
         values: Numbers (n,).
         label: Says in words what the i-th number is.
 
     Raises:
-        InputError: A number is not finite; the text has its label.
+        InputError: A number is not finite or beyond `LARGEST`; the text has its label.
     """
-    finite = np.isfinite(values)
-    if not finite.all():
-        first = int(finite.argmin())
+    sane = np.abs(values) <= LARGEST
+    if not sane.all():
+        first = int(sane.argmin())
         raise InputError(f"{label(first)} is {values[first]}")
 
 
