@@ -143,7 +143,7 @@ def torque_residual(
     """Difference of alpha + Gamma tau~_c and inverse dynamics of the same law, relative."""
     plain = PLAIN_FORMS[law](dynamics, state.v, error, probe.impedance)
     task_acceleration = decoupling.commanded_acceleration(law, dynamics, error, probe.impedance)
-    wanted = decoupling.joint_acceleration(dynamics, state.v, task_acceleration)
+    wanted = dynamics.joint_acceleration(state.v, task_acceleration)
     fast = probe.team.inverse_dynamics(state.q, state.v, wanted)
     return _relative(fast - plain, plain)
 

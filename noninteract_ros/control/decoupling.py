@@ -49,6 +49,61 @@ class TaskDynamics:
     inertias: tuple[Array, ...]
     constant: tuple[bool, ...]
 
+    @property
+    def inverse_sizes(self) -> Array:
+        """Something with the Frobenius norm of S."""
+        return self.S
+
+    def velocity(self, v: Array) -> Array:
+        """J v, shape (n,)."""
+        return self.J @ v
+
+    def acceleration_of(self, v: Array, joint_acceleration: Array) -> Array:
+        """Task acceleration J a + J_rate v of a joint acceleration, shape (n,)."""
+        return self.J @ joint_acceleration + self.J_rate @ v
+
+    def joint_acceleration(self, v: Array, task_acceleration: Array) -> Array:
+        """Joint acceleration S (a - J_rate v) that gives a task acceleration, shape (n,)."""
+        return self.S @ (task_acceleration - self.J_rate @ v)
+
+    def coriolis_force(self, e_rate: Array) -> Array:
+        """C~_i e_rate_i of every subtask with C~_i = S_i' (C S_i + M dS_i/dt), shape (n,)."""
+        U = _spread_by_subtask(self, e_rate)
+        W = self.C @ U - self.MS @ (self.J_rate @ U)  # dS/dt = -S J_rate S
+        blocks = self.S.T @ W
+        force = np.zeros_like(e_rate)
+        for i, part in enumerate(self.slices):
+            if not self.constant[i]:
+                force[part] = blocks[part, i]
+        return force
+
+    def natural_coriolis_force(self, e_rate: Array) -> Array:
+        """mu e_rate with mu = S' (C S + M dS/dt), shape (n,)."""
+        u = self.S @ e_rate
+        return self.S.T @ (self.C @ u - self.MS @ (self.J_rate @ u))
+
+    def divide_by_inertia(self, force: Array) -> Array:
+        """Lambda^-1 f, shape (n,)."""
+        return np.linalg.solve(self.inertia, force)
+
+    def divide_by_inertias(self, force: Array) -> Array:
+        """M_i^-1 f_i of every subtask, shape (n,)."""
+        result = np.empty_like(force)
+        for part, inertia in zip(self.slices, self.inertias, strict=True):
+            result[part] = np.linalg.solve(inertia, force[part])
+        return result
+
+    def multiply_by_inertias(self, acceleration: Array) -> Array:
+        """M_i a_i of every subtask, shape (n,)."""
+        result = np.empty_like(acceleration)
+        for part, inertia in zip(self.slices, self.inertias, strict=True):
+            result[part] = inertia @ acceleration[part]
+        return result
+
+    def decoupled_external_force(self, external_torque: Array) -> Array:
+        """tau~e = Gamma^-1 tau_e = M_s J M^-1 tau_e, shape (n,) [N]."""
+        return self.multiply_by_inertias(self.J @ np.linalg.solve(self.M, external_torque))
+
 
 @dataclass(frozen=True, slots=True)
 class TaskError:
@@ -119,35 +174,18 @@ def commanded_acceleration(
     """Task acceleration that a law asks for, shape (n,): the fast form."""
     pull = impedance.damping * error.e_rate + impedance.force(error.e) - error.force
     if law == "natural":
-        drift = natural_coriolis_force(dynamics, error.e_rate)
-        return error.reference_acceleration - np.linalg.solve(dynamics.inertia, drift + pull)
+        drift = dynamics.natural_coriolis_force(error.e_rate)
+        return error.reference_acceleration - dynamics.divide_by_inertia(drift + pull)
     if law == "paper":
         drift = paper_coriolis_force(dynamics, error.e_rate)
     else:
-        drift = coriolis_force(dynamics, error.e_rate)
-    return error.reference_acceleration - divide_by_inertias(dynamics, drift + pull)
-
-
-def joint_acceleration(dynamics: TaskDynamics, v: Array, task_acceleration: Array) -> Array:
-    """Joint acceleration S (a - J_rate v) that gives a task acceleration, shape (n,)."""
-    return dynamics.S @ (task_acceleration - dynamics.J_rate @ v)
+        drift = dynamics.coriolis_force(error.e_rate)
+    return error.reference_acceleration - dynamics.divide_by_inertias(drift + pull)
 
 
 def torque_of(dynamics: TaskDynamics, v: Array, joint_acceleration: Array) -> Array:
     """M a + C v + g, shape (n,) [N or N m]."""
     return dynamics.M @ joint_acceleration + dynamics.C @ v + dynamics.g
-
-
-def coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
-    """C~_i e_rate_i of every subtask with C~_i = S_i' (C S_i + M dS_i/dt), shape (n,)."""
-    U = _spread_by_subtask(dynamics, e_rate)
-    W = dynamics.C @ U - dynamics.MS @ (dynamics.J_rate @ U)  # dS/dt = -S J_rate S
-    blocks = dynamics.S.T @ W
-    force = np.zeros_like(e_rate)
-    for i, part in enumerate(dynamics.slices):
-        if not dynamics.constant[i]:
-            force[part] = blocks[part, i]
-    return force
 
 
 def paper_coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
@@ -160,37 +198,9 @@ def paper_coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
     return force
 
 
-def natural_coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
-    """mu e_rate with mu = S' (C S + M dS/dt), shape (n,)."""
-    u = dynamics.S @ e_rate
-    return dynamics.S.T @ (dynamics.C @ u - dynamics.MS @ (dynamics.J_rate @ u))
-
-
 def _spread_by_subtask(dynamics: TaskDynamics, e_rate: Array) -> Array:
     """Columns S_i e_rate_i, shape (n, number of subtasks)."""
     columns = np.zeros((len(e_rate), len(dynamics.slices)))
     for i, part in enumerate(dynamics.slices):
         columns[part, i] = e_rate[part]
     return dynamics.S @ columns
-
-
-def divide_by_inertias(dynamics: TaskDynamics, force: Array) -> Array:
-    """M_i^-1 f_i of every subtask, shape (n,)."""
-    result = np.empty_like(force)
-    for part, inertia in zip(dynamics.slices, dynamics.inertias, strict=True):
-        result[part] = np.linalg.solve(inertia, force[part])
-    return result
-
-
-def multiply_by_inertias(dynamics: TaskDynamics, acceleration: Array) -> Array:
-    """M_i a_i of every subtask, shape (n,)."""
-    result = np.empty_like(acceleration)
-    for part, inertia in zip(dynamics.slices, dynamics.inertias, strict=True):
-        result[part] = inertia @ acceleration[part]
-    return result
-
-
-def decoupled_external_force(dynamics: TaskDynamics, external_torque: Array) -> Array:
-    """tau~e = Gamma^-1 tau_e = M_s J M^-1 tau_e, shape (n,) [N]."""
-    acceleration = dynamics.J @ np.linalg.solve(dynamics.M, external_torque)
-    return multiply_by_inertias(dynamics, acceleration)

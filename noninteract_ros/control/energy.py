@@ -6,13 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.decoupling import (
-    TaskDynamics,
-    TaskError,
-    coriolis_force,
-    decoupled_external_force,
-    multiply_by_inertias,
-)
+from noninteract_ros.control.decoupling import TaskDynamics, TaskError
 from noninteract_ros.control.impedance import Impedance
 
 
@@ -49,12 +43,12 @@ def energy(
         task_acceleration: What the law commanded, shape (n,).
         external_torque: tau_e on the joints, shape (n,) [N or N m].
     """
-    external = decoupled_external_force(dynamics, external_torque)
+    external = dynamics.decoupled_external_force(external_torque)
     acceleration = task_acceleration - error.reference_acceleration
-    momentum_rate = multiply_by_inertias(dynamics, acceleration) + external
+    momentum_rate = dynamics.multiply_by_inertias(acceleration) + external
     # e_rate' (dM_i/dt) e_rate / 2 = e_rate' C~_i e_rate, since dM_i/dt - 2 C~_i is skew.
-    force = momentum_rate + coriolis_force(dynamics, error.e_rate) + impedance.force(error.e)
-    kinetic = 0.5 * error.e_rate * multiply_by_inertias(dynamics, error.e_rate)
+    force = momentum_rate + dynamics.coriolis_force(error.e_rate) + impedance.force(error.e)
+    kinetic = 0.5 * error.e_rate * dynamics.multiply_by_inertias(error.e_rate)
     return Energy(
         _by_subtask(dynamics, kinetic + impedance.potential(error.e)),
         _by_subtask(dynamics, error.e_rate * force),

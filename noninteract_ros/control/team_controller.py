@@ -11,7 +11,6 @@ from noninteract_ros.control.decoupling import (
     TaskDynamics,
     TaskError,
     commanded_acceleration,
-    joint_acceleration,
     task_dynamics,
     task_terms,
 )
@@ -154,7 +153,7 @@ class TeamController:
             self.stack.slices,
             self._mode.impedance.inertias,
         )
-        relative = self._guard.relative(dynamics.S)
+        relative = self._guard.relative(dynamics.inverse_sizes)
         share = self._guard.law_share(relative)
         recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
         acceleration, wanted = self._blended(now, state, task, error, dynamics, share, recovery)
@@ -228,13 +227,13 @@ class TeamController:
         """Task and joint acceleration of law and recovery together, shape (n,) each."""
         if share == 0.0:  # The law is not even defined at a singularity; what fades starts over.
             self._left, self._bump_start = None, -np.inf
-            return task.J @ recovery + task.J_rate @ state.v, recovery
+            return dynamics.acceleration_of(state.v, recovery), recovery
         acceleration = self._acceleration(now, state, task, error, dynamics)
-        wanted = joint_acceleration(dynamics, state.v, acceleration)
+        wanted = dynamics.joint_acceleration(state.v, acceleration)
         if share == 1.0:
             return acceleration, wanted
         wanted = share * wanted + (1.0 - share) * recovery
-        return task.J @ wanted + task.J_rate @ state.v, wanted
+        return dynamics.acceleration_of(state.v, wanted), wanted
 
     def _acceleration(
         self,
@@ -267,7 +266,7 @@ class TeamController:
         dynamics: TaskDynamics,
     ) -> Array:
         if mode.stopped:
-            return task.J @ (-self._stop_rate * state.v) + task.J_rate @ state.v
+            return dynamics.acceleration_of(state.v, -self._stop_rate * state.v)
         return commanded_acceleration(mode.law, dynamics, error, mode.impedance)
 
     def _error(self, task: SubtaskState, v: Array, led: Sequence[Led]) -> TaskError:

@@ -8,12 +8,9 @@ from scipy.integrate import solve_ivp
 
 from noninteract_ros.control.decoupling import (
     LAWS,
+    TaskDynamics,
     TaskError,
     commanded_acceleration,
-    coriolis_force,
-    decoupled_external_force,
-    joint_acceleration,
-    natural_coriolis_force,
     paper_coriolis_force,
     task_dynamics,
     torque_of,
@@ -73,7 +70,7 @@ class Case:
     def torque(self, law, state, error):
         dynamics = self.dynamics(state)
         acceleration = commanded_acceleration(law, dynamics, error, self.impedance)
-        wanted = joint_acceleration(dynamics, state.v, acceleration)
+        wanted = dynamics.joint_acceleration(state.v, acceleration)
         return torque_of(dynamics, state.v, wanted)
 
     def task_acceleration(self, state: TeamState, torque) -> np.ndarray:
@@ -205,7 +202,7 @@ def test_whole_task_coriolis_matrix_is_skew_where_inertias_are_natural():
     for seed in range(10):
         state = case.state(seed)
         dynamics = case.dynamics(state)
-        mu = np.column_stack([natural_coriolis_force(dynamics, axis) for axis in np.eye(4)])
+        mu = np.column_stack([dynamics.natural_coriolis_force(axis) for axis in np.eye(4)])
         ends = [
             case.dynamics(case.arms.state(state.q + h * state.v, state.v)).inertia
             for h in (-STEP, STEP)
@@ -222,7 +219,7 @@ def test_coriolis_forces_are_those_of_the_matrices(keys):
         dynamics = case.dynamics(case.state(seed))
         e_rate = case.error(seed).e_rate
         for force, matrices in (
-            (coriolis_force, subtask_coriolis),
+            (TaskDynamics.coriolis_force, subtask_coriolis),
             (paper_coriolis_force, paper_subtask_coriolis),
         ):
             expected = block_diagonal(dynamics, matrices(dynamics)) @ e_rate
@@ -289,7 +286,7 @@ def test_natural_closed_loop_is_the_equation_promised():
         external = np.random.default_rng(seed).normal(size=case.n)
         total = case.torque("natural", state, error) + external
         e_rate_rate = case.task_acceleration(state, total) - error.reference_acceleration
-        drift = natural_coriolis_force(dynamics, error.e_rate)
+        drift = dynamics.natural_coriolis_force(error.e_rate)
         left = dynamics.inertia @ e_rate_rate + drift + case.impedance.damping * error.e_rate
         left += case.impedance.force(error.e)
         right = dynamics.S.T @ external + error.force
@@ -303,7 +300,7 @@ def test_decoupled_external_force_undoes_the_decoupling_matrix():
         dynamics = case.dynamics(case.state(0))
         force = np.arange(1.0, 5.0)
         torque = decoupling_matrix(dynamics) @ force
-        np.testing.assert_allclose(decoupled_external_force(dynamics, torque), force, rtol=1e-11)
+        np.testing.assert_allclose(dynamics.decoupled_external_force(torque), force, rtol=1e-11)
 
 
 @pytest.mark.parametrize("law", LAWS)

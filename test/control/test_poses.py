@@ -9,7 +9,6 @@ from spatial_arms import random_state, spatial_team
 from noninteract_ros.control.decoupling import (
     TaskError,
     commanded_acceleration,
-    joint_acceleration,
     task_dynamics,
     torque_of,
 )
@@ -82,7 +81,7 @@ class Case:
     def torque(self, law: str, state: TeamState, error: TaskError) -> np.ndarray:
         dynamics = self.dynamics(state)
         wanted = commanded_acceleration(law, dynamics, error, self.impedance)
-        return torque_of(dynamics, state.v, joint_acceleration(dynamics, state.v, wanted))
+        return torque_of(dynamics, state.v, dynamics.joint_acceleration(state.v, wanted))
 
 
 CASES = [
@@ -236,7 +235,7 @@ class Motion:
         rates = wanted.velocity, wanted.acceleration
         error = TaskError(e, task.J @ v - wanted.velocity, *rates, self.force)
         asked = commanded_acceleration("noninteracting", dynamics, error, case.impedance)
-        torque = torque_of(dynamics, v, joint_acceleration(dynamics, v, asked))
+        torque = torque_of(dynamics, v, dynamics.joint_acceleration(v, asked))
         found = energy(dynamics, error, case.impedance, asked, self.push)
         return case.team.forward_dynamics(q, v, torque + self.push), found, error
 
