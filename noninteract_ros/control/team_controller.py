@@ -11,20 +11,18 @@ from noninteract_ros.control.decoupling import (
     TaskDynamics,
     TaskError,
     commanded_acceleration,
-    task_dynamics,
-    task_terms,
 )
 from noninteract_ros.control.energy import Energy, energy
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
 from noninteract_ros.control.joint_safety import JointSafety
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.singularity import SingularityGuard, best_regularity
+from noninteract_ros.control.structure import Structure
 from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
+from noninteract_ros.control.team_view import DenseView, Seen, TeamView
 from noninteract_ros.control.tick import Mode, Tick
-from noninteract_ros.last_call import LastCall
 from noninteract_ros.subtasks.stack import SubtaskStack
-from noninteract_ros.subtasks.subtask import SubtaskState
-from noninteract_ros.team.team import Team, TeamState
+from noninteract_ros.team.team import Team
 
 DEFAULT_SAFETY = SafetySettings()
 JUMP = 0.1  # [m or rad] a coordinate that is this much further than it can have come was put there
@@ -69,7 +67,7 @@ class TeamController:
         self._state_timeout = state_timeout
         self._bump, self._bump_start = np.zeros(team.n), -np.inf
         self._last: tuple[float, Array] | None = None
-        self._terms = LastCall(task_terms)
+        self._view: TeamView = Structure.of(team, stack) or DenseView(team, stack)
         self._guard = SingularityGuard(team, safety, best_regularity(team, stack))
         self._safety = JointSafety(team, safety)
 
@@ -128,8 +126,8 @@ class TeamController:
             q: Configuration, shape (nq,).
             v: Velocity, shape (n,).
         """
-        state = self.team.state(q, v)
-        task = self.stack.evaluate(state)
+        seen = self._view.evaluate(q, v, self._mode.impedance.inertias)
+        state, task, dynamics = seen.state, seen.task, seen.dynamics
         restarted = self._restart_reason(now, q, v)
         elapsed = 0.0 if self._last is None else now - self._last[0]
         step = 0.0 if restarted else elapsed
@@ -143,20 +141,11 @@ class TeamController:
             item.resting(now) if stopped else item.advance(now, step)
             for item in self.inputs.values()
         )
-        error = self._error(task, v, led)
-        dynamics = self._terms(
-            state.M,
-            state.C,
-            state.g,
-            task.J,
-            task.J_rate,
-            self.stack.slices,
-            self._mode.impedance.inertias,
-        )
+        error = self._error(seen, led)
         relative = self._guard.relative(dynamics.inverse_sizes)
         share = self._guard.law_share(relative)
         recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
-        acceleration, wanted = self._blended(now, state, task, error, dynamics, share, recovery)
+        acceleration, wanted = self._blended(now, seen, error, share, recovery)
         asked = self.team.inverse_dynamics(q, v, wanted)
         torque, safety = self._safety.protect(q, v, asked, state.g, elapsed)
         self._last = (now, q)
@@ -215,39 +204,27 @@ class TeamController:
             item.rest_at(x[part])
 
     def _blended(
-        self,
-        now: float,
-        state: TeamState,
-        task: SubtaskState,
-        error: TaskError,
-        dynamics: TaskDynamics,
-        share: float,
-        recovery: Array,
+        self, now: float, seen: Seen, error: TaskError, share: float, recovery: Array
     ) -> tuple[Array, Array]:
         """Task and joint acceleration of law and recovery together, shape (n,) each."""
+        dynamics, v = seen.dynamics, seen.state.v
         if share == 0.0:  # The law is not even defined at a singularity; what fades starts over.
             self._left, self._bump_start = None, -np.inf
-            return dynamics.acceleration_of(state.v, recovery), recovery
-        acceleration = self._acceleration(now, state, task, error, dynamics)
-        wanted = dynamics.joint_acceleration(state.v, acceleration)
+            return dynamics.acceleration_of(v, recovery), recovery
+        acceleration = self._acceleration(now, seen, error)
+        wanted = dynamics.joint_acceleration(v, acceleration)
         if share == 1.0:
             return acceleration, wanted
         wanted = share * wanted + (1.0 - share) * recovery
-        return dynamics.acceleration_of(state.v, wanted), wanted
+        return dynamics.acceleration_of(v, wanted), wanted
 
-    def _acceleration(
-        self,
-        now: float,
-        state: TeamState,
-        task: SubtaskState,
-        error: TaskError,
-        dynamics: TaskDynamics,
-    ) -> Array:
+    def _acceleration(self, now: float, seen: Seen, error: TaskError) -> Array:
         """Task acceleration in force, with the bump of the last change fading out."""
-        wanted = self._wanted(self._mode, state, task, error, dynamics)
+        v = seen.state.v
+        wanted = self._wanted(self._mode, v, error, seen.dynamics)
         if self._left is not None:
-            left = task_dynamics(state, task, self.stack.slices, self._left.impedance.inertias)
-            before = self._wanted(self._left, state, task, error, left) + self._fading(now)
+            left = self._view.again(seen, self._left.impedance.inertias)
+            before = self._wanted(self._left, v, error, left) + self._fading(now)
             self._bump, self._bump_start, self._left = before - wanted, now, None
         return wanted + self._fading(now)
 
@@ -257,22 +234,16 @@ class TeamController:
             return np.zeros_like(self._bump)
         return self._bump * (1.0 - progress) ** 2 * (1.0 + 2.0 * progress)
 
-    def _wanted(
-        self,
-        mode: Mode,
-        state: TeamState,
-        task: SubtaskState,
-        error: TaskError,
-        dynamics: TaskDynamics,
-    ) -> Array:
+    def _wanted(self, mode: Mode, v: Array, error: TaskError, dynamics: TaskDynamics) -> Array:
         if mode.stopped:
-            return dynamics.acceleration_of(state.v, -self._stop_rate * state.v)
+            return dynamics.acceleration_of(v, -self._stop_rate * v)
         return commanded_acceleration(mode.law, dynamics, error, mode.impedance)
 
-    def _error(self, task: SubtaskState, v: Array, led: Sequence[Led]) -> TaskError:
+    def _error(self, seen: Seen, led: Sequence[Led]) -> TaskError:
         position = np.concatenate([item.reference.position for item in led])
         velocity = np.concatenate([item.reference.velocity for item in led])
         acceleration = np.concatenate([item.reference.acceleration for item in led])
         force = np.concatenate([item.force for item in led])
-        e = self.stack.difference(task.x, position)
-        return TaskError(e, task.J @ v - velocity, velocity, acceleration, force)
+        e = self.stack.difference(seen.task.x, position)
+        e_rate = seen.dynamics.velocity(seen.state.v) - velocity
+        return TaskError(e, e_rate, velocity, acceleration, force)

@@ -8,6 +8,7 @@ from noninteract_ros.schema import key
 from noninteract_ros.subtasks.composed_subtask import ComposedSubtask
 from noninteract_ros.subtasks.edges import NO_SUBTASKS
 from noninteract_ros.subtasks.mixed_position import chosen_axes
+from noninteract_ros.subtasks.mixing import MeanMixing
 from noninteract_ros.subtasks.parts import MixedPoints
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.subtasks.team_means import ALIGNMENT_DOC, WEIGHTS_DOC, mean_weights
@@ -37,7 +38,7 @@ class CooperativePose:
         rotation = team_rotation(name, team, weights, self.alignment)
         axes = chosen_axes(name, self.axes, team)
         subtask = ComposedSubtask(name, (name,), axes, MixedPoints(weights[None]), rotation)
-        subtask.frame = rotation
+        subtask.frame, subtask.mixing = rotation, MeanMixing(axes, weights, rotation)
         return subtask
 
 
@@ -58,5 +59,5 @@ class CooperativeOrientation:
         weights = mean_weights(name, self.weights, team)
         rotation = team_rotation(name, team, weights, self.alignment)
         subtask = ComposedSubtask(name, (name,), (), None, rotation)
-        subtask.frame = rotation
+        subtask.frame, subtask.mixing = rotation, MeanMixing((), weights, rotation)
         return subtask

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from noninteract_ros.schema import key
 from noninteract_ros.subtasks.edges import NO_SUBTASKS
 from noninteract_ros.subtasks.mixed_position import MixedPosition, chosen_axes
+from noninteract_ros.subtasks.mixing import MeanMixing
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.subtasks.team_means import WEIGHTS_DOC, mean_weights
 from noninteract_ros.team.robot import AXES
@@ -29,5 +30,8 @@ class CooperativePosition:
         Raises:
             ScenarioError: Weights do not fit the team, or the axes do not.
         """
-        mean = mean_weights(name, self.weights, team)[None, :]
-        return MixedPosition(name, (name,), chosen_axes(name, self.axes, team), mean)
+        weights = mean_weights(name, self.weights, team)
+        axes = chosen_axes(name, self.axes, team)
+        subtask = MixedPosition(name, (name,), axes, weights[None, :])
+        subtask.mixing = MeanMixing(axes, weights, None)
+        return subtask

@@ -10,6 +10,7 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError, one_of
 from noninteract_ros.schema import key
 from noninteract_ros.subtasks.edges import NO_SUBTASKS
+from noninteract_ros.subtasks.mixing import JointMixing
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.team import Team, TeamState
 
@@ -64,6 +65,7 @@ class JointSelection(Subtask):
         self._in_q: Array = np.array([in_q for in_q, _ in places])
         self._J = np.eye(n)[[in_v for _, in_v in places]]
         self._J_rate = np.zeros_like(self._J)
+        self.mixing = JointMixing(*zip(*places, strict=True))
 
     def evaluate(self, state: TeamState) -> SubtaskState:
         """Value and its constant Jacobian."""

@@ -18,6 +18,7 @@ from noninteract_ros.subtasks.edges import (
     frame_named,
 )
 from noninteract_ros.subtasks.mixed_position import chosen_axes
+from noninteract_ros.subtasks.mixing import EdgeMixing
 from noninteract_ros.subtasks.parts import MixedPoints, Part
 from noninteract_ros.subtasks.relative_parts import RelativePoints, RelativeRotations
 from noninteract_ros.subtasks.subtask import Subtask
@@ -47,13 +48,16 @@ class RelativePose:
                 frame is no subtask with an orientation.
         """
         pairs = edge_pairs(name, self.edges, team)
+        places = edge_places(pairs, team)
         frame = frame_named(name, self.frame, others)
         weights = edge_weights(pairs, team)
         points: Part = MixedPoints(weights) if frame is None else RelativePoints(weights, frame)
         offsets = tool_offsets(team, self.alignment)
-        rotations = RelativeRotations(edge_places(pairs, team), offsets, frame)
+        rotations = RelativeRotations(places, offsets, frame)
         axes = chosen_axes(name, self.axes, team)
-        return ComposedSubtask(name, edge_names(pairs), axes, points, rotations)
+        subtask = ComposedSubtask(name, edge_names(pairs), axes, points, rotations)
+        subtask.mixing = EdgeMixing(axes, tuple(places), True, offsets, frame)
+        return subtask
 
 
 @dataclass(frozen=True)
@@ -70,5 +74,8 @@ class RelativeOrientation:
         pairs = edge_pairs(name, self.edges, team)
         frame = frame_named(name, self.frame, others)
         offsets = tool_offsets(team, self.alignment)
-        rotations = RelativeRotations(edge_places(pairs, team), offsets, frame)
-        return ComposedSubtask(name, edge_names(pairs), (), None, rotations)
+        places = edge_places(pairs, team)
+        rotations = RelativeRotations(places, offsets, frame)
+        subtask = ComposedSubtask(name, edge_names(pairs), (), None, rotations)
+        subtask.mixing = EdgeMixing((), tuple(places), True, offsets, frame)
+        return subtask

@@ -13,10 +13,12 @@ from noninteract_ros.subtasks.edges import (
     WORLD,
     edge_names,
     edge_pairs,
+    edge_places,
     edge_weights,
     frame_named,
 )
 from noninteract_ros.subtasks.mixed_position import MixedPosition, chosen_axes
+from noninteract_ros.subtasks.mixing import EdgeMixing
 from noninteract_ros.subtasks.relative_parts import RelativePoints
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.robot import AXES
@@ -45,6 +47,8 @@ class RelativePosition:
         elements, weights = edge_names(pairs), edge_weights(pairs, team)
         axes = chosen_axes(name, self.axes, team)
         frame = frame_named(name, self.frame, others)
-        if frame is None:
-            return MixedPosition(name, elements, axes, weights)
-        return ComposedSubtask(name, elements, axes, RelativePoints(weights, frame), None)
+        subtask: Subtask = MixedPosition(name, elements, axes, weights)
+        if frame is not None:
+            subtask = ComposedSubtask(name, elements, axes, RelativePoints(weights, frame), None)
+        subtask.mixing = EdgeMixing(axes, tuple(edge_places(pairs, team)), False, None, frame)
+        return subtask

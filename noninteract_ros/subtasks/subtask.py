@@ -7,6 +7,7 @@ from functools import cached_property
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.mixing import Mixing
 from noninteract_ros.subtasks.parts import Part
 from noninteract_ros.team.team import TeamState
 
@@ -39,6 +40,7 @@ class Subtask(ABC):
         rotates: Whether each element has a rotation.
         frame: Orientation of the team that other subtasks can be seen from, or None; its
             `evaluate` returns one rotation with its differentials, see `parts.Rows`.
+        mixing: How it mixes what each robot does, or None; see `mixing`.
         dim: Number of coordinates p of a velocity.
         size: Number of numbers of a value.
     """
@@ -48,6 +50,7 @@ class Subtask(ABC):
     axes: tuple[str, ...]
     rotates: bool = False
     frame: Part | None = None
+    mixing: Mixing | None = None
 
     @cached_property
     def layout(self) -> Layout:

@@ -46,10 +46,14 @@ class TeamRotation:
     Args:
         weights: Weight of each robot, with sum 1, shape (N,).
         offsets: What `tool_offsets` returns.
+
+    Attributes:
+        weights: As given.
+        offsets: As given.
     """
 
     def __init__(self, weights: Array, offsets: Array | None) -> None:
-        self._weights, self._offsets = weights, offsets
+        self.weights, self.offsets = weights, offsets
         self._halfway = weights.shape == (2,) and weights[0] == weights[1]
         self._last: tuple[TeamState, Rows] | None = None
 
@@ -67,12 +71,12 @@ class TeamRotation:
         """Largest angle between a tool and the mean [rad]."""
         R_c = self.evaluate(state).value[0]
         apart = so3.log(so3.quaternion(self._tools(state) @ R_c.T))
-        return float(np.linalg.norm(apart[self._weights > 0.0], axis=1).max())
+        return float(np.linalg.norm(apart[self.weights > 0.0], axis=1).max())
 
     def _tools(self, state: TeamState) -> Array:
-        if self._offsets is None:
+        if self.offsets is None:
             return state.tool_rotations
-        return state.tool_rotations @ self._offsets
+        return state.tool_rotations @ self.offsets
 
     def _midpoint(self, state: TeamState) -> Rows:
         """Half-way from the first tool: R_c = H R_1 with H H = R_2 R_1'.
@@ -96,8 +100,8 @@ class TeamRotation:
 
     def _mean(self, state: TeamState) -> Rows:
         """The mean by Newton's method; its differentials from the implicit equation."""
-        q_c, phi = self._solve(so3.quaternion(self._tools(state)))
-        w = self._weights[:, None, None]
+        q_c, phi = self.solve(so3.quaternion(self._tools(state)))
+        w = self.weights[:, None, None]
         A = so3.inverse_jacobian(phi)
         B_inverse = np.linalg.inv((w * A).sum(axis=0).T)
         turning, turning_rate = state.tool_jacobians[:, 3:], state.tool_jacobian_rates[:, 3:]
@@ -109,16 +113,16 @@ class TeamRotation:
         moved = (w * (A_rate @ turning + A @ turning_rate)).sum(axis=0)
         return Rows(so3.matrix(q_c)[None], J[None], (B_inverse @ (moved - B_rate @ J))[None])
 
-    def _solve(self, tools: Array) -> tuple[Array, Array]:
+    def solve(self, tools: Array) -> tuple[Array, Array]:
         """Quaternion of the mean (4,) and the rotation vectors from it to the tools (N, 3)."""
         # The mean of the lines that the quaternions span, whatever their signs.
-        q_c = np.linalg.eigh((self._weights[:, None] * tools).T @ tools)[1][:, -1]
+        q_c = np.linalg.eigh((self.weights[:, None] * tools).T @ tools)[1][:, -1]
         for _ in range(_ITERATIONS):
             phi = so3.log(so3.product(tools, so3.inverse(q_c)))
-            rest = self._weights @ phi
+            rest = self.weights @ phi
             if np.abs(rest).max() < _ROUNDING:
                 break
-            B = (self._weights[:, None, None] * so3.inverse_jacobian(phi)).sum(axis=0).T
+            B = (self.weights[:, None, None] * so3.inverse_jacobian(phi)).sum(axis=0).T
             q_c = so3.normalized(so3.product(so3.exp(np.linalg.solve(B, rest)), q_c))
         return q_c, phi
 

@@ -59,6 +59,7 @@ class Team:
         friction: Viscous friction of the joints, shape (n,) [N s/m or N m s/rad]; M, C and g do
             not have it.
         brake_damping: Damping of the robots' own brakes, shape (n,) [N s/m or N m s/rad].
+        prismatic: Whether all joints are, so that nothing but the positions changes.
 
     Raises:
         TeamError: Fewer than two robots, or a name twice.
@@ -91,7 +92,7 @@ class Team:
         self._data = self.model.createData()
         self._tools = [self.model.getFrameId(f"{r.name}/{r.tool_frame}") for r in robots]
         self._lower = np.tri(self.n, k=-1, dtype=bool)
-        self._prismatic = all(joint.shortname() in PRISMATIC for joint in self.model.joints[1:])
+        self.prismatic = all(joint.shortname() in PRISMATIC for joint in self.model.joints[1:])
         self._constant: TeamState | None = None
 
     @staticmethod
@@ -117,7 +118,7 @@ class Team:
         On a team of prismatic joints all terms but the tool points are constant, and the same
         arrays are handed out at every call.
         """
-        if not self._prismatic:
+        if not self.prismatic:
             return self._state(q, v)
         if self._constant is None:
             self._constant = self._state(np.zeros_like(q), np.zeros(self.n))
