@@ -22,7 +22,7 @@ ENERGY_LABELS = ("time", "storage", "rate", "supplied", "dissipated", "intervent
 
 
 class Telemetry:
-    """Publishes feedback at every tick, everything else at the telemetry rate.
+    """Publishes feedback to a human at every tick, everything else at the telemetry rate.
 
     Args:
         node: The controller's node.
@@ -91,12 +91,14 @@ class Telemetry:
         self._tick = tick
         self.safety.note(seconds(stamp), tick)
         slices = self._stack.slices
-        for i, publisher in self._feedback_to.items():
-            feedback = tick.feedback[slices[i]]
-            publisher.publish(self._codecs[i].encode_wrench(stamp, feedback))
         count = round(seconds(stamp) * self._rate) if self._lockstep else self._answered
+        due = count % self._period == 0
         self._answered += 1
-        if count % self._period:
+        for i, publisher in self._feedback_to.items():
+            if due or tick.led[i].source == "human":
+                feedback = tick.feedback[slices[i]]
+                publisher.publish(self._codecs[i].encode_wrench(stamp, feedback))
+        if not due:
             return
         energy = core.energy(tick, self._team.external_torque(tick.state, self._wrenches))
         accounts = np.array([energy.storage, energy.rate, energy.supplied, energy.dissipated]).T

@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import TeamError
+from noninteract_ros.last_call import LastCall
 from noninteract_ros.team.joining import append_model
 from noninteract_ros.team.joint_coordinates import JointCoordinates
 from noninteract_ros.team.robot import Robot
@@ -94,6 +95,7 @@ class Team:
         self._lower = np.tri(self.n, k=-1, dtype=bool)
         self.prismatic = all(joint.shortname() in PRISMATIC for joint in self.model.joints[1:])
         self._constant: TeamState | None = None
+        self._tool_inverses = LastCall(self._compute_tool_inverses)
 
     @staticmethod
     def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
@@ -192,11 +194,19 @@ class Team:
 
     def tool_wrenches(self, state: TeamState, torque: Array) -> Array:
         """Smallest wrench on each tool that gives a joint torque, shape (N, 6) [N, N m]."""
-        wrenches = np.empty((len(self.robots), 6))
-        for i, part in enumerate(self.velocity_slices):
-            J = state.tool_jacobians[i][:, part]
-            wrenches[i] = np.linalg.lstsq(J.T, torque[part])[0]
-        return wrenches
+        return np.array(
+            [
+                inverse @ torque[part]
+                for inverse, part in zip(
+                    self._tool_inverses(state.tool_jacobians), self.velocity_slices, strict=True
+                )
+            ]
+        )
+
+    def _compute_tool_inverses(self, jacobians: Array) -> list[Array]:
+        """Pseudo-inverse of each robot's transposed tool Jacobian, shape (6, n_i) each."""
+        parts = zip(jacobians, self.velocity_slices, strict=True)
+        return [np.linalg.pinv(J[:, part].T) for J, part in parts]
 
     def index(self, name: str) -> int:
         """Position of a robot in the team.
