@@ -13,12 +13,12 @@ class SafetySettings:
 
     singularity_begin: float = key(
         "Regularity, relative to the team's best, below which the law begins to fade out",
-        0.1,
+        0.3,
         positive=True,
         maximum=1.0,
     )
     singularity_end: float = key(
-        "Relative regularity below which the team only recovers", 0.03, positive=True, maximum=1.0
+        "Relative regularity below which the team only recovers", 0.1, positive=True, maximum=1.0
     )
     recovery_stiffness: float = key(
         "Pull back to the last regular configuration [1/s^2]", 25.0, minimum=0.0
@@ -33,7 +33,7 @@ class SafetySettings:
         minimum=0.0,
     )
     velocity_rate: float = key(
-        "Rate at which a joint loses what it is too fast [1/s]", 100.0, minimum=0.0
+        "Rate at which a joint loses what it is too fast [1/s]", 200.0, minimum=0.0
     )
     torque_rate: float = key(
         "Largest change of a joint torque per second [N/s or N m/s]; 0: none", 0.0, minimum=0.0
