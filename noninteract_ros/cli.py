@@ -218,13 +218,15 @@ def bench(
 
 def _measure(parts: Sequence[str], settings: "BenchSettings") -> list["Row"]:
     from noninteract_ros.analysis import bench as measures
+    from noninteract_ros.analysis.bench_teams import bench_teams
     from noninteract_ros.nodes import bench as nodes
 
     scenarios = measures.bench_scenarios()
-    paper = scenarios["paper"]
+    paper, teams = scenarios["paper"], bench_teams() if "law" in parts else {}
     rows = []
     with console.status("starting") as status:
-        for name, values in scenarios.items() if {"law", "node"} & set(parts) else ():
+        chosen = scenarios if {"law", "node"} & set(parts) else {}
+        for name, values in (chosen | teams).items():
             status.update(f"law and controller node, {name}")
             try:
                 material = measures.Material.of(values, settings.ticks + measures.WARM_UP)
@@ -233,7 +235,7 @@ def _measure(parts: Sequence[str], settings: "BenchSettings") -> list["Row"]:
                 continue
             if "law" in parts:
                 rows += measures.law_rows(name, material, settings.ticks)
-            if "node" in parts:
+            if "node" in parts and name not in teams:
                 rows += nodes.node_rows(name, values, material, settings.ticks)
         if "lockstep" in parts:
             status.update("lockstep of the real programs")

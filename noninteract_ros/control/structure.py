@@ -43,7 +43,7 @@ class Structure:
 
     @classmethod
     def of(cls, team: Team, stack: SubtaskStack, smallest: int = SMALLEST) -> "Structure | None":
-        """The structure of a team of at least `smallest` robots; None if it has none or needs none.
+        """The structure of a team of at least `smallest` robots; None if it has or needs none.
 
         The dense form of a team whose terms are constant costs next to nothing.
         """

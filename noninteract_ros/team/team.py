@@ -141,7 +141,6 @@ class Team:
     def _state(self, q: Array, v: Array) -> TeamState:
         model, data = self.model, self._data
         pin.computeAllTerms(model, data, q, v)
-        pin.computeJointJacobiansTimeVariation(model, data, q, v)
         M = data.M.copy()
         np.copyto(M, M.T, where=self._lower)  # Pinocchio fills the upper triangle.
         C = pin.computeCoriolisMatrix(model, data, q, v).copy()
