@@ -21,6 +21,7 @@ from noninteract_ros.control.reference import Reference
 from noninteract_ros.rehearsal import History, rehearse
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario_file import config_folders, find_scenario, read_parameters
+from noninteract_ros.team.urdf_files import EXAMPLES, share_folders
 
 BATCH = 50  # calls of one thing before the other thing has its turn
 WARM_UP = 20  # calls that are not counted
@@ -98,9 +99,16 @@ def take_turns(things: Mapping[str, Timed], count: int) -> dict[str, Array]:
 
 
 def bench_scenarios() -> dict[str, dict[str, Any]]:
-    """Values of all scenarios of the package, by name."""
-    files = {file.stem: file for folder in config_folders() for file in folder.glob("*.yaml")}
-    return {name: read_parameters(find_scenario(name)) for name in sorted(files)}
+    """Values of all scenarios of the package whose robots are installed, by name."""
+    names = {file.stem for folder in config_folders() for file in folder.glob("*.yaml")}
+    files = {name: find_scenario(name) for name in sorted(names)}
+    return {name: read_parameters(file) for name, file in files.items() if _installed(file)}
+
+
+def _installed(file: Path) -> bool:
+    """Whether a scenario's robots are there: those of example-robot-data are an extra."""
+    installed = any((share / EXAMPLES).is_dir() for share in share_folders())
+    return installed or EXAMPLES not in file.read_text()
 
 
 @dataclass(frozen=True)

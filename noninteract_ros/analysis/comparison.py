@@ -2,18 +2,32 @@
 """The recording against rehearsals: the same run again, without a source, under another law."""
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from noninteract_ros.analysis.checks import Check, at_most, not_applicable
+from noninteract_ros.analysis.holding import (
+    Holding,
+    deflection,
+    holding_force,
+    impedance_of,
+    recorded_holding,
+    told_rows,
+)
 from noninteract_ros.analysis.influences import Influence
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.rehearsals import Joints, Variant, rehearse_all
 from noninteract_ros.arrays import Array
 
-MOVED = 1e-9  # [m] how far a source may move a subtask that is not its own
+# [m; rad] How far a source may move a subtask that is not its own. On inertias that vary with
+# where the team is, holding the torque over a tick moves it by `holding.deflection` more.
+MOVED = 1e-9
 SAME = 1e-12  # [m, m/s] the same arithmetic on another processor may round differently
+# (29) keeps a subtask on its reference whatever others do; how it comes back is another thing.
+OFF = "a subtask is off its reference, and its inertia depends on where the others are"
 DECOUPLING_LAWS = ("noninteracting", "paper")
 WINDOW = 2.0  # [s] that side runs go on after the last source has begun
 BUDGET = 400_000  # coordinates times ticks that one rehearsal may take
@@ -111,28 +125,80 @@ class Comparer:
         metrics: dict[str, Any] = {}
         checks = []
         for source, owned in self._owned.items():
-            name = f"noninteraction.{source}"
-            reason = self._incomparable(owned)
-            if self._law not in DECOUPLING_LAWS:
-                reason = f"law {self._law} lets motions cross over"
             without = self._results[self._without(self._law, source)]
-            moved = {} if reason else self._moved_by(without)
-            if not reason and not moved[owned] > 0.0:
+            others = np.ones(self._recorded.team.n, dtype=bool)
+            others[self._recorded.part(owned)] = False
+            reason, moved, limits = self._moved_against(without, owned, others)
+            if not reason and not moved[~others].max() > 0.0:
                 reason = f"{source} did not move {owned} within {self._side_s:g} s"
-            others = [value for subtask, value in moved.items() if subtask != owned]
-            if not reason and not others:
-                reason = "there is no other subtask"
             metrics[f"without_{source}"] = {
                 "reason": reason or None,
                 "compared_s": self._side_s,
-                "moved_m": None if reason else moved,
+                "moved_m": None if reason else self._by_subtask(moved),
+                "allowed_m": None if reason else self._by_subtask(limits),
             }
-            checks.append(
-                not_applicable(name, MOVED, "m", reason)
-                if reason
-                else at_most(name, _largest(np.array(others)), MOVED, "m")
-            )
+            name, unit = f"noninteraction.{source}", self._unit
+            if reason:
+                checks.append(not_applicable(name, MOVED, unit, reason))
+                continue
+            worst = int(np.argmax(np.where(others, moved / limits, -1.0)))
+            checks.append(at_most(name, moved[worst], float(limits[worst]), unit))
         return metrics, checks
+
+    def _moved_against(
+        self, without: Joints, owned: str, others: NDArray[np.bool_]
+    ) -> tuple[str, Array, Array]:
+        """Why nothing can be told, or ""; how far coordinates moved, and how far they may."""
+        nothing = np.zeros(self._recorded.team.n)
+        if self._law not in DECOUPLING_LAWS:
+            return f"law {self._law} lets motions cross over", nothing, nothing
+        alone_in_it = "" if others.any() else "there is no other subtask"
+        if reason := self._incomparable(owned) or self._carried_over() or alone_in_it:
+            return reason, nothing, nothing
+        difference, alone = self._held_apart(without)
+        off = np.abs(without.error).max(axis=0) > MOVED + alone
+        if not self._recorded.constant and (off & others).any():
+            return OFF, nothing, nothing
+        return "", self._moved_by(without), MOVED + difference
+
+    @property
+    def _unit(self) -> str:
+        return "m, rad" if self._recorded.stack.layout.rotates else "m"
+
+    def _carried_over(self) -> str:
+        """Why subtasks move each other whatever the law does, or an empty text."""
+        scenario = self._recorded.scenario
+        if scenario.surroundings:
+            return f"{', '.join(scenario.surroundings)} carries motions over"
+        if scenario.pushes and not self._recorded.constant:
+            return "what a push does depends on where the team is"
+        return ""
+
+    def _held_apart(self, without: Joints) -> tuple[Array, Array]:
+        """What holding the torque can do, shape (n,) each.
+
+        How far it can lead the recording and a rehearsal apart, and the rehearsal itself away
+        from its references.
+        """
+        recorded = self._recorded
+        if recorded.constant:
+            return np.zeros(recorded.team.n), np.zeros(recorded.team.n)
+        rows = told_rows(recorded, min(self._side, len(recorded.ticks)))
+        rows = rows[recorded.ticks[rows] < len(without.q)]
+        ticks = recorded.ticks[rows]
+        force = self._holding.force[: len(rows)]
+        changes = np.zeros_like(without.v)
+        changes[1:-1] = np.diff(without.torque[1:], axis=0)
+        alone = holding_force(recorded, without.q[ticks], without.v[ticks], changes[ticks])
+        impedance = impedance_of(recorded)
+        return (
+            deflection(impedance, force - alone, self._side_s),
+            deflection(impedance, alone, self._side_s),
+        )
+
+    @cached_property
+    def _holding(self) -> Holding:
+        return recorded_holding(self._recorded)
 
     def _crossings(self) -> dict[str, Any]:
         """How far each source moves each subtask, by law, in rehearsals."""
@@ -157,22 +223,31 @@ class Comparer:
     def _side_s(self) -> float:
         return (self._side - 1) / self._recorded.rate
 
-    def _moved_by(self, without: Joints) -> dict[str, float]:
-        """Largest distance of the recording from a rehearsal in each subtask [m]."""
+    def _moved_by(self, without: Joints) -> Array:
+        """Largest distance of the recording from a rehearsal, shape (n,) [m; rad]."""
         recorded = self._recorded
         rows = recorded.ticks < len(without.q)
         ticks = recorded.ticks[rows]
-        same_ticks = Joints(without.q[ticks], without.v[ticks])
-        return self._moved(Joints(recorded.q[rows], recorded.v[rows]), same_ticks)
+        values = recorded.task_values(without.q[ticks], without.v[ticks])[0]
+        return self._apart(recorded.values[0][rows], values)
 
     def _moved(self, a: Joints, b: Joints) -> dict[str, float]:
-        """Largest distance between two runs in each subtask, while both last [m]."""
+        """Largest distance between two runs in each subtask, while both last [m; rad]."""
         count = min(len(a.q), len(b.q))
         values = [self._recorded.task_values(run.q[:count], run.v[:count])[0] for run in (a, b)]
-        names, slices = self._recorded.stack.names, self._recorded.stack.value_slices
+        return self._by_subtask(self._apart(*values))
+
+    def _apart(self, a: Array, b: Array) -> Array:
+        """Largest error of values a towards values b, both of shape (m, size), shape (n,)."""
+        apart = np.abs(self._recorded.stack.difference(a, b)).max(axis=0, initial=0.0)
+        return np.where(np.isfinite(apart), apart, np.inf)
+
+    def _by_subtask(self, numbers: Array) -> dict[str, float]:
+        """Largest of each subtask's numbers, of shape (n,)."""
+        stack = self._recorded.stack
         return {
-            name: _largest((values[0] - values[1])[:, part])
-            for name, part in zip(names, slices, strict=True)
+            name: float(numbers[part].max())
+            for name, part in zip(stack.names, stack.slices, strict=True)
         }
 
     def _incomparable(self, ignored: str) -> str:

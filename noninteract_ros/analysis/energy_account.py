@@ -9,14 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noninteract_ros.analysis.checks import Check, at_least, at_most, not_applicable
+from noninteract_ros.analysis.holding import Holding
 from noninteract_ros.analysis.recorded import Motion, Recorded, common_instants, select
 from noninteract_ros.arrays import Array
+from noninteract_ros.subtasks.layout import Layout
 
+INTERVENTIONS = "interventions"
 LAWS = ("noninteracting", "paper")
 GROWTH = 1e-8  # share of the peak at 1 kHz: what holding the torque over a tick can leave
 PASSIVE = 1e-3  # share of the peak at 1 kHz by which (31) may be missed for the same reason
 SAMPLED = 0.02  # share of the peak at 1 kHz: powers are sampled where the torque is fresh
-JUMP = 1e-4  # [m] a desired motion that leaves its own path by more has jumped
+JUMP = 1e-4  # [m; rad] a desired motion that leaves its own path by more has jumped
+UNEXPLAINED = 0.2  # share of the work of holding the torque that its mean force may miss
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,9 @@ class Account:
         rate: Shape (n,) [W].
         supplied: Power from outside, shape (n,) [W].
         desired: Desired motion at the same instants.
+        velocity_error: Shape (n, p) [m/s; rad/s].
+        in_force: Whether nothing but the law gave torques, from each instant to the next, shape
+            (n - 1,): no singularity and no limit of a joint.
     """
 
     t: Array
@@ -36,6 +43,8 @@ class Account:
     rate: Array
     supplied: Array
     desired: Motion
+    velocity_error: Array
+    in_force: NDArray[np.bool_]
 
 
 def account(recorded: Recorded, subtask: str) -> Account:
@@ -46,24 +55,38 @@ def account(recorded: Recorded, subtask: str) -> Account:
     """
     series = recorded.run.labelled(f"{subtask}/energy")
     t = recorded.since_start(series.stamps)
-    desired = recorded.motion(f"{subtask}/desired", subtask)
-    rows, others = common_instants(t, desired.t)
+    tracking = recorded.tracking(subtask)
+    rows, others = common_instants(t, tracking.t)
     storage, rate, supplied = (series[key][rows] for key in ("storage", "rate", "supplied"))
-    return Account(t[rows], storage, rate, supplied, select(desired, others))
+    desired = select(tracking.desired, others)
+    velocity_error = tracking.actual.velocity[others] - desired.velocity
+    told = INTERVENTIONS in series.labels
+    in_force = np.diff(series[INTERVENTIONS][rows] if told else np.zeros(len(rows))) == 0.0
+    return Account(t[rows], storage, rate, supplied, desired, velocity_error, in_force)
 
 
-def energy_metrics(recorded: Recorded, subtask: str) -> tuple[dict[str, Any], list[Check]]:
+def energy_metrics(
+    recorded: Recorded, subtask: str, holding: Holding | None = None
+) -> tuple[dict[str, Any], list[Check]]:
     """Sign, growth and consistency of one subtask's storage function.
+
+    Args:
+        recorded: The run.
+        subtask: Name of the subtask.
+        holding: Of a team without constant inertias, what holding the torque does to it. Its work
+            bounds growth (31) and explains what the balance (33) misses.
 
     Raises:
         RecordingError: A topic is missing or of another type.
     """
     found = account(recorded, subtask)
+    work = _holding_work(recorded, subtask, found, holding) if holding else np.zeros(len(found.t))
     peak = float(found.storage.max(initial=0.0))
     growth, growth_reason = _growth(recorded, subtask, found)
-    excess, mismatch, blind = _against_supply(recorded, subtask, found)
+    excess, mismatch, blind = _against_supply(recorded, subtask, found, work)
     excess_reason = blind or _crossing(recorded)
     lowest = float(found.storage.min(initial=np.inf))
+    held = float(np.abs(np.diff(work)).sum())
     metrics = {
         "storage_min_J": lowest,
         "storage_max_J": peak,
@@ -73,13 +96,14 @@ def energy_metrics(recorded: Recorded, subtask: str) -> tuple[dict[str, Any], li
         "rise_beyond_supply_J": None if blind else excess,
         "rate_mismatch_J": None if blind else mismatch,
         "rate_reason": blind or None,
+        "work_of_holding_J": held if holding else None,
     }
     coarse = 1000.0 / recorded.rate
-    sampled = SAMPLED * peak * coarse
+    supplied = (1.0 + UNEXPLAINED) * held
     claims = (
-        ("growth", growth or 0.0, GROWTH * peak * coarse**3, growth_reason),
-        ("passive", excess, PASSIVE * peak * coarse, excess_reason),
-        ("rate", mismatch, sampled, blind),
+        ("growth", growth or 0.0, GROWTH * peak * coarse**3 + supplied, growth_reason),
+        ("passive", excess, PASSIVE * peak * coarse + supplied, excess_reason),
+        ("rate", mismatch, SAMPLED * peak * coarse + UNEXPLAINED * held, blind),
     )
     checks = [at_least(f"storage_positive.{subtask}", lowest, 0.0, "J")]
     for claim, value, limit, reason in claims:
@@ -92,22 +116,33 @@ def energy_metrics(recorded: Recorded, subtask: str) -> tuple[dict[str, Any], li
     return metrics, checks
 
 
+def _holding_work(recorded: Recorded, subtask: str, found: Account, holding: Holding) -> Array:
+    """Work of holding the torque on a subtask since the first instant, shape (n,) [J]."""
+    force = np.zeros_like(found.velocity_error)
+    rows, others = common_instants(found.t, holding.t)
+    force[rows] = holding.force[others][:, recorded.part(subtask)]
+    return _integral(found.t, (found.velocity_error * force).sum(axis=1))
+
+
 def _crossing(recorded: Recorded) -> str:
     """Why a subtask's storage may grow at the cost of another's, or an empty text."""
     law = recorded.scenario.general.law
+    if reason := _late(recorded):
+        return reason
     return "" if law in LAWS else f"under law {law} other subtasks supply it too"
 
 
-def _rotating(recorded: Recorded, subtask: str) -> str:
-    """Why stillness and jumps of a reference cannot be told, or an empty text."""
-    return "its desired rotations are not looked at" if recorded.task(subtask).rotates else ""
+def _late(recorded: Recorded) -> str:
+    """Why nobody knows what holding the torque does, or an empty text."""
+    known = recorded.lockstep or recorded.constant
+    return "" if known else "wall time: torques act late, on inertias that vary"
 
 
 def _growth(recorded: Recorded, subtask: str, found: Account) -> tuple[float | None, str]:
     """Largest growth over any time with a still reference and nothing that acts from outside."""
-    if reason := _crossing(recorded) or _rotating(recorded, subtask):
+    if reason := _crossing(recorded):
         return None, reason
-    quiet = np.logical_and(_still(found.desired), _untouched(recorded, found.t))
+    quiet = _still(found.desired) & _untouched(recorded, found.t) & found.in_force
     if not quiet.any():
         return None, "no time with a still reference and without external force"
     largest = 0.0
@@ -118,8 +153,12 @@ def _growth(recorded: Recorded, subtask: str, found: Account) -> tuple[float | N
     return largest, ""
 
 
-def _against_supply(recorded: Recorded, subtask: str, found: Account) -> tuple[float, float, str]:
+def _against_supply(
+    recorded: Recorded, subtask: str, found: Account, work: Array
+) -> tuple[float, float, str]:
     """Storage against integrated powers, over pieces without a jump of the reference.
+
+    Where a person pushes a robot elsewhere than at its tool nobody has told the supply.
 
     Returns:
         Largest rise beyond what was supplied (31) [J], largest difference from the integrated
@@ -129,15 +168,17 @@ def _against_supply(recorded: Recorded, subtask: str, found: Account) -> tuple[f
     unseen = set(recorded.scenario.robots) - set(recorded.scenario.general.force_sensors)
     if loaded and unseen:
         return 0.0, 0.0, "the controller has no force sensors on every robot"
-    if reason := _rotating(recorded, subtask):
+    if reason := _late(recorded):
         return 0.0, 0.0, reason
     excess = mismatch = 0.0
-    for first, last in _runs(~_jumps(found.desired)):
+    told = ~_jumps(recorded.task(subtask).layout, found.desired)
+    told &= _felt(recorded, found.t) & found.in_force
+    for first, last in _runs(told):
         piece = slice(first, last + 1)
         gain = found.storage[piece] - found.storage[first]
         unsupplied = gain - _integral(found.t[piece], found.supplied[piece])
         excess = max(excess, float((unsupplied - np.minimum.accumulate(unsupplied)).max()))
-        rest = gain - _integral(found.t[piece], found.rate[piece])
+        rest = gain - _integral(found.t[piece], found.rate[piece]) - (work[piece] - work[first])
         mismatch = max(mismatch, float(np.abs(rest).max()))
     return excess, mismatch, ""
 
@@ -154,16 +195,26 @@ def _still(desired: Motion) -> NDArray[np.bool_]:
     return np.asarray(rest[1:] & rest[:-1] & same)
 
 
-def _jumps(desired: Motion) -> NDArray[np.bool_]:
+def _jumps(layout: Layout, desired: Motion) -> NDArray[np.bool_]:
     """Whether the reference jumps between each instant and the next, shape (n - 1,)."""
     h = np.diff(desired.t)[:, None]
     x, v, a = desired.position, desired.velocity, desired.acceleration
-    ahead = x[:-1] + h * v[:-1] + 0.5 * h * h * a[:-1]
-    back = x[1:] - h * v[1:] + 0.5 * h * h * a[1:]
-    gap = np.minimum(np.abs(x[1:] - ahead), np.abs(x[:-1] - back))
+    way = layout.difference(x[1:], x[:-1])
+    ahead = way - h * v[:-1] - 0.5 * h * h * a[:-1]
+    back = way - h * v[1:] + 0.5 * h * h * a[1:]
+    gap = np.minimum(np.abs(ahead), np.abs(back))
     # A jump in velocity alone shows as one in position only half as well.
     kick = np.abs(v[1:] - v[:-1] - 0.5 * h * (a[1:] + a[:-1]))
     return np.asarray(((gap > JUMP) | (h * kick > JUMP)).any(axis=1))
+
+
+def _felt(recorded: Recorded, t: Array) -> NDArray[np.bool_]:
+    """Whether tools feel all that pushes, from each instant to the next, shape (n - 1,)."""
+    felt = np.ones(max(len(t) - 1, 0), dtype=bool)
+    for push in recorded.scenario.pushes.values():
+        if not push.on_tool(recorded.team):
+            felt &= (t[1:] <= push.start) | (t[:-1] >= push.start + push.duration)
+    return felt
 
 
 def _untouched(recorded: Recorded, t: Array) -> NDArray[np.bool_]:
@@ -177,7 +228,7 @@ def _untouched(recorded: Recorded, t: Array) -> NDArray[np.bool_]:
         known = np.zeros(len(t), dtype=bool)
         known[rows] = ~(series.force[others].any(axis=1) | series.torque[others].any(axis=1))
         free &= known
-    return np.asarray(free[1:] & free[:-1])
+    return np.asarray(free[1:] & free[:-1]) & _felt(recorded, t)
 
 
 def _runs(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The figures of the paper's Section V, drawn from a recording, and the team's paths."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from matplotlib.figure import Figure
 
 from noninteract_ros.analysis.energy_account import Account, account
 from noninteract_ros.analysis.paths import paths_figure
-from noninteract_ros.analysis.recorded import Recorded, Tracking
+from noninteract_ros.analysis.recorded import Recorded, Tracking, select
 from noninteract_ros.analysis.style import COLOURS, DASHES, new_figure, save, styled
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import RecordingError
@@ -146,9 +147,9 @@ def _aligned(recorded: Recorded, subtask: str) -> tuple[Array, Account]:
     start = recorded.start(subtask)
     since = found.t - (found.t[0] if start is None else start)
     rows = since >= -1e-9
-    return since[rows], Account(
-        found.t[rows], found.storage[rows], found.rate[rows], found.supplied[rows], found.desired
-    )
+    columns = ("t", "storage", "rate", "supplied", "velocity_error")
+    told = {name: getattr(found, name)[rows] for name in columns}
+    return since[rows], replace(found, desired=select(found.desired, rows), **told)
 
 
 def _shown(recorded: Recorded) -> float:

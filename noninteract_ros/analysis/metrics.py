@@ -15,6 +15,7 @@ from noninteract_ros.analysis.closed_form import (
 )
 from noninteract_ros.analysis.comparison import Comparer
 from noninteract_ros.analysis.energy_account import energy_metrics
+from noninteract_ros.analysis.holding import recorded_holding
 from noninteract_ros.analysis.influences import Influence, influences
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.arrays import Array
@@ -57,11 +58,13 @@ def measure(recorded: Recorded, other_laws: bool = True) -> Findings:
     }
     closed, closed_checks = closed_form_metrics(recorded, outside)
     comparison = Comparer(recorded, outside, other_laws).compare()
+    varying = recorded.lockstep and not recorded.constant
+    holding = recorded_holding(recorded) if varying else None
     energies: dict[str, Any] = {}
     energy_checks: list[Check] = []
     for name in recorded.stack.names:
         try:
-            energies[name], found = energy_metrics(recorded, name)
+            energies[name], found = energy_metrics(recorded, name, holding)
         except RecordingError as error:
             energies[name] = {"reason": str(error)}
             found = [not_applicable(f"storage_positive.{name}", 0.0, "J", str(error))]
@@ -134,7 +137,7 @@ def completeness_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check
 
 
 def tracking_metrics(recorded: Recorded, subtask: str) -> dict[str, Any]:
-    """Errors from the first reference on: Euclidean norm of each element.
+    """Errors from the first reference on: Euclidean norm of each element, angle of each rotation.
 
     Raises:
         RecordingError: A topic is missing or of another type.
@@ -146,15 +149,24 @@ def tracking_metrics(recorded: Recorded, subtask: str) -> dict[str, Any]:
     rows = tracking.t >= start - 1e-9
     if not rows.any():
         return {"reason": "no values while it was led"}
-    axes = len(recorded.task(subtask).axes)
-    e = tracking.actual.position[rows] - tracking.desired.position[rows]
-    norms = np.linalg.norm(e.reshape(len(e), -1, axes), axis=2)
+    layout, axes = recorded.task(subtask).layout, len(recorded.task(subtask).axes)
+    e = layout.difference(tracking.actual.position[rows], tracking.desired.position[rows])
+    metrics: dict[str, Any] = {"led_from_s": start}
+    if axes:
+        norms = np.linalg.norm(e[:, layout.rates].reshape(len(e), -1, axes), axis=2)
+        metrics |= _extremes(norms, "m")
+    if layout.rotates:
+        metrics |= _extremes(np.linalg.norm(e[:, layout.angular], axis=2), "rad")
+    return metrics
+
+
+def _extremes(norms: Array, unit: str) -> dict[str, float]:
+    """First, largest, mean and last of errors, shape (n, elements)."""
     return {
-        "led_from_s": start,
-        "initial_error_m": float(norms[0].max()),
-        "max_error_m": float(norms.max()),
-        "rms_error_m": float(np.sqrt((norms**2).mean())),
-        "final_error_m": float(norms[-1].max()),
+        f"initial_error_{unit}": float(norms[0].max()),
+        f"max_error_{unit}": float(norms.max()),
+        f"rms_error_{unit}": float(np.sqrt((norms**2).mean())),
+        f"final_error_{unit}": float(norms[-1].max()),
     }
 
 

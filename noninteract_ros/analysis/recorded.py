@@ -22,13 +22,13 @@ from noninteract_ros.team.robot import AXES
 
 @dataclass(frozen=True)
 class Motion:
-    """A motion of one subtask at some instants; of rotating elements, their positions.
+    """A motion of one subtask at some instants.
 
     Attributes:
         t: Time of the run, shape (n,) [s].
-        position: Shape (n, p) [m].
-        velocity: Shape (n, p) [m/s].
-        acceleration: Shape (n, p) [m/s^2]; NaN where it was not sent.
+        position: Values, with the quaternions of rotating elements, shape (n, size).
+        velocity: Shape (n, p) [m/s; rad/s].
+        acceleration: Shape (n, p) [m/s^2; rad/s^2]; NaN where it was not sent.
     """
 
     t: Array
@@ -68,6 +68,7 @@ class Recorded:
         t: Time of each state, shape (n,) [s].
         q: Configurations, shape (n, nq).
         v: Velocities, shape (n, n).
+        torque: Torques that were held until each state, shape (n, n).
 
     Raises:
         RecordingError: The recording holds no scenario, a wrong one, or not the joint states.
@@ -90,6 +91,7 @@ class Recorded:
         positions = self.states.position[:, columns]
         self.q = np.array([self.team.configuration_from_joints(row) for row in positions])
         self.v = self.states.velocity[:, columns]
+        self.torque = self.states.effort[:, columns]
 
     def _columns(self, states: JointSeries) -> list[int]:
         missing = [name for name in self.team.joint_names if name not in states.names]
@@ -152,9 +154,13 @@ class Recorded:
         """
         series = self.run.trajectory(topic)
         task = self.task(subtask)
-        fields = (series.translation, series.linear_velocity, series.linear_acceleration)
+        pairs = (
+            (series.translation, series.quaternion),
+            (series.linear_velocity, series.angular_velocity),
+            (series.linear_acceleration, series.angular_acceleration),
+        )
         t = series.stamps - self._origin
-        return Motion(t, *(_coordinates(task, series, field) for field in fields))
+        return Motion(t, *(_coordinates(task, series, *pair) for pair in pairs))
 
     def tracking(self, subtask: str) -> Tracking:
         """Actual and desired motion of a subtask at the instants that both have.
@@ -208,13 +214,24 @@ def _parameters(content: Any) -> Mapping[str, Any]:
     return nest(merged)
 
 
-def _coordinates(task: Subtask, series: TrajectorySeries, field: Array) -> Array:
-    """Elements x axes of a field (n, elements, 3), shape (n, p)."""
+def _coordinates(task: Subtask, series: TrajectorySeries, linear: Array, turning: Array) -> Array:
+    """Numbers of a subtask's layout, element by element, shape (n, size) or (n, p).
+
+    Args:
+        task: The subtask.
+        series: What was recorded.
+        linear: Its translations, or their derivatives, shape (n, elements, 3).
+        turning: Its quaternions, or angular derivatives, shape (n, elements, 4 or 3).
+    """
     elements = [series.names.index(name) for name in task.elements if name in series.names]
+    width = len(task.axes) + (turning.shape[2] if task.rotates else 0)
     if len(elements) < len(task.elements):
-        return np.full((len(field), len(task.elements) * len(task.axes)), np.nan)
+        return np.full((len(linear), len(task.elements) * width), np.nan)
     axes = [AXES.index(axis) for axis in task.axes]
-    return field[:, elements][:, :, axes].reshape(len(field), -1)
+    parts = [linear[:, elements][:, :, axes]]
+    if task.rotates:
+        parts.append(turning[:, elements])
+    return np.concatenate(parts, axis=2).reshape(len(linear), -1)
 
 
 def common_instants(a: Array, b: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -38,22 +38,26 @@ class Joints:
     Attributes:
         q: Configuration, shape (ticks, nq).
         v: Velocity, shape (ticks, n).
+        torque: Torque that was held until each tick, shape (ticks, n).
+        error: Errors of all subtasks at the last tick before each, shape (ticks, n) [m; rad].
     """
 
     q: Array
     v: Array
+    torque: Array
+    error: Array
 
 
 def rehearse_variant(scenario: Scenario, variant: Variant, ticks: int) -> Joints:
     """Rehearses a variant of a scenario, first state included."""
     general = replace(scenario.general, law=variant.law)
     rehearsal = Rehearsal(replace(scenario, general=general), variant.human, variant.autonomy)
-    q, v = [rehearsal.q], [rehearsal.simulation.v]
+    simulation = rehearsal.simulation
+    rows = [(rehearsal.q, simulation.v, simulation.torque, np.zeros(rehearsal.team.n))]
     for _ in range(ticks - 1):
-        rehearsal.step()
-        q.append(rehearsal.q)
-        v.append(rehearsal.simulation.v)
-    return Joints(np.array(q), np.array(v))
+        error = rehearsal.step().error.e
+        rows.append((rehearsal.q, simulation.v, simulation.torque, error))
+    return Joints(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def rehearse_all(scenario: Scenario, jobs: Sequence[tuple[Variant, int]]) -> list[Joints]:
