@@ -175,9 +175,9 @@ class DesiredMotion:
         """Whether a reference is new or leaves its own path by more than the limits allow."""
         if self._followed is None:
             return True
-        gap = motion.minus(self._followed.at(step, self._layout), self._layout)
+        away, velocity = motion.departure(self._followed, step, self._layout)
         max_velocity, max_acceleration, _ = self._limits
         return bool(
-            (np.abs(gap.position) > max_velocity * step).any()
-            or (np.abs(gap.velocity) > max_acceleration * step).any()
+            (np.abs(away) > max_velocity * step).any()
+            or (np.abs(velocity) > max_acceleration * step).any()
         )

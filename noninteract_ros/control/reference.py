@@ -41,6 +41,10 @@ class Reference:
         """The gap from another motion to this one, all of it of shape (dim,)."""
         return Reference(*layout.gap(self._motion, base._motion))
 
+    def departure(self, before: "Reference", dt: float, layout: Layout) -> tuple[Array, Array]:
+        """Position and velocity of `self.minus(before.at(dt))`, shape (dim,) each."""
+        return layout.departure(self._motion, before._motion, dt)
+
     def plus(self, gap: "Reference", layout: Layout) -> "Reference":
         """The motion that a gap, all of it of shape (dim,), leads away from this one."""
         return Reference(*layout.moved(self._motion, gap._motion))

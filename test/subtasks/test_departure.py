@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How far a motion is from where another one led: the short way to `gap` from `ahead`."""
+
+import numpy as np
+import pytest
+
+from noninteract_ros.subtasks.layout import Layout
+
+
+def motion_of(layout, rng):
+    x = layout.sum(layout.identity, rng.normal(size=layout.dim))
+    return x, rng.normal(size=layout.dim), rng.normal(size=layout.dim)
+
+
+@pytest.mark.parametrize("layout", [Layout((3, 2), (True, False)), Layout.numbers(4)])
+@pytest.mark.parametrize("dt", [0.0, 0.01, 0.3])
+def test_departure_is_the_gap_from_what_lies_ahead(layout, dt):
+    rng = np.random.default_rng(0)
+    before, motion = motion_of(layout, rng), motion_of(layout, rng)
+    expected = layout.gap(motion, layout.ahead(before, dt))
+    for found, wanted in zip(layout.departure(motion, before, dt), expected, strict=False):
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-13)
+
+
+def test_rest_stays_and_no_time_changes_nothing():
+    layout = Layout((3,), (True,))
+    x, velocity, acceleration = motion_of(layout, np.random.default_rng(1))
+    still = np.zeros(layout.dim)
+    assert layout.ahead((x, still, still), 0.5)[0] is x
+    assert layout.ahead((x, velocity, acceleration), 0.0)[1] is velocity
