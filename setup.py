@@ -55,6 +55,6 @@ setup(
             "types-PyYAML>=6.0",
             "colcon-common-extensions>=0.3",
             "setuptools>=70.1,<80",  # 70.1 builds wheels by itself; colcon refuses 80.
-        ]
+        ],
     },
 )
