@@ -14,7 +14,7 @@ from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
-SMALLEST = 8  # robots: below, the dense form is the faster one
+SMALLEST = 10  # robots: below, the dense form is the faster one
 
 
 class Structure:
