@@ -21,9 +21,9 @@ class SafetySettings:
         "Relative regularity below which the team only recovers", 0.1, positive=True, maximum=1.0
     )
     recovery_stiffness: float = key(
-        "Pull back to the last regular configuration [1/s^2]", 25.0, minimum=0.0
+        "Pull back to the last regular configuration [1/s^2]", 100.0, minimum=0.0
     )
-    recovery_damping: float = key("Damping of the recovery [1/s]", 10.0, positive=True)
+    recovery_damping: float = key("Damping of the recovery [1/s]", 20.0, positive=True)
     position_margin: float = key(
         "Distance to a joint limit at which it begins to repel [m or rad]", 0.1, positive=True
     )

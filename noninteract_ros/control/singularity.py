@@ -61,7 +61,7 @@ class SingularityGuard:
         self._regular, self._pull = None, 0.0
 
     def relative(self, S: Array) -> float:
-        """Regularity of the task Jacobian with inverse S, relative to the team's best."""
+        """Regularity relative to the team's best, of S or of anything with its Frobenius norm."""
         return regularity(S) / self._best
 
     def law_share(self, relative: float) -> float:

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What people are told of limits: in words, once, and long enough to be read."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from noninteract_ros.control.joint_safety import SafetyReport
+from noninteract_ros.control.safety_watch import LINGER, SafetyWatch
+
+JOINTS = ("left/joint_1", "left/joint_2")
+
+
+def tick(law_share: float = 1.0, regularity: float = 0.8, **report) -> SimpleNamespace:
+    """What the watch looks at of a tick."""
+    safety = SafetyReport(**report)
+    return SimpleNamespace(
+        law_share=law_share,
+        regularity=regularity,
+        safety=safety,
+        intervened=law_share < 1.0 or safety.acted,
+    )
+
+
+@pytest.mark.parametrize(
+    ("what", "texts"),
+    [
+        ({}, []),
+        ({"law_share": 0.4}, ["near a singularity: recovering"]),
+        ({"effort_share": 0.9}, ["at effort limits"]),
+        ({"clipped": True}, ["at effort limits"]),
+        ({"repelled": (0,)}, ["left/joint_1 at its position limit"]),
+        ({"rate_share": 0.0}, ["at the torque-rate limit"]),
+        ({"too_fast": (0, 1)}, ["left/joint_1 too fast", "left/joint_2 too fast"]),
+        ({"finite": False}, ["the law gives no finite torque: braking"]),
+    ],
+)
+def test_each_condition_has_words(what, texts):
+    """Joints are called by name, and a team inside its limits is no news."""
+    watch = SafetyWatch(JOINTS)
+    watch.note(1.0, tick(**what))
+    assert watch.conditions(1.0) == texts
+    assert watch.interventions == bool(texts)
+
+
+def test_a_condition_that_comes_and_goes_is_told_without_flicker():
+    """Every third tick at the effort limit is one condition, until it has been over for 1 s."""
+    watch = SafetyWatch(JOINTS)
+    for k in range(3000):
+        now = k / 1000.0
+        watch.note(now, tick(effort_share=0.5 if k % 3 == 0 and k < 1500 else 1.0))
+        told = watch.conditions(now) == ["at effort limits"]
+        assert told == (now <= 1.497 + LINGER)
+    assert watch.interventions == 500
+
+
+def test_values_are_the_lowest_since_they_were_asked_for():
+    """A single tick between two reports is seen; then it starts anew."""
+    watch = SafetyWatch(JOINTS)
+    for share in (1.0, 0.3, 1.0):
+        watch.note(0.0, tick(law_share=share, regularity=0.2 + share, effort_share=0.1 + share))
+    values = watch.values()
+    assert values["law share, lowest"] == 0.3
+    assert values["regularity, lowest"] == 0.5
+    assert values["effort share, lowest"] == 0.4
+    assert values["torque rate share, lowest"] == 1.0
+    watch.note(0.1, tick())
+    values = watch.values()
+    assert values["law share, lowest"] == values["effort share, lowest"] == 1.0
+    assert values["interventions"] == 1
+
+
+def test_a_reset_forgets_conditions_of_another_time():
+    """When the team's clock starts anew, nothing is told of what its former time had."""
+    watch = SafetyWatch(JOINTS)
+    watch.note(50.0, tick(law_share=0.0))
+    watch.reset()
+    assert watch.conditions(0.0) == []
+    assert watch.interventions == 1
