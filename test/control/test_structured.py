@@ -5,11 +5,13 @@ import numpy as np
 import pytest
 from spatial_arms import spatial_arm
 
-from noninteract_ros.control.decoupling import TaskError, commanded_acceleration
+from noninteract_ros.control.decoupling import LAWS, TaskError, commanded_acceleration
 from noninteract_ros.control.energy import energy
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
 from noninteract_ros.control.singularity import regularity
 from noninteract_ros.control.structure import Structure
+from noninteract_ros.control.subtask_input import InputSettings
+from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.control.team_view import DenseView
 from noninteract_ros.control.tree import Tree
 from noninteract_ros.subtasks.cooperative_pose import CooperativeOrientation, CooperativePose
@@ -189,6 +191,36 @@ def test_small_teams_and_other_subtasks_stay_dense():
     assert isinstance(Structure.of(team, stack, 3), Structure)
     stack.subtasks[0].mixing = None
     assert Structure.of(team, stack, 3) is None
+
+
+def test_a_controller_of_ten_arms_uses_it_through_every_change():
+    team = team_of(10, ("zyzyzy",))
+    stack = stack_of(team)
+    settings = [ImpedanceSettings((40.0,), (9.0,)) for _ in stack.subtasks]
+    inputs = [InputSettings() for _ in stack.subtasks]
+    core, dense = (TeamController(team, stack, LAWS[0], settings, inputs) for _ in range(2))
+    assert isinstance(core._view, Structure)
+    dense._view = DenseView(team, stack)
+    rng = np.random.default_rng(0)
+    q, v = team.q0, 0.1 * rng.normal(size=team.n)
+    changes = [
+        lambda item: None,
+        lambda item: item.set_law("natural"),
+        lambda item: item.set_impedance("gap", ImpedanceSettings((9.0,), (2.0,), (1.5,))),
+        lambda item: item.set_law("paper"),
+        lambda item: item.stop(),
+        lambda item: None,
+    ]
+    for number, change in enumerate(changes):
+        ticks = []
+        for item in (core, dense):
+            change(item)
+            ticks.append(item.step(1e-3 * number, q, v))
+        assert_close(ticks[0].torque, ticks[1].torque)
+        assert_close(ticks[0].x_rate, ticks[1].x_rate)
+        assert_close(ticks[0].task_acceleration, ticks[1].task_acceleration)
+        assert ticks[0].regularity == pytest.approx(ticks[1].regularity, rel=1e-9)
+        q = team.integrate(q, 1e-3 * v)
 
 
 class Counted(np.ndarray):
