@@ -87,8 +87,12 @@ class Rehearsal:
         if self._felt:
             part = self.stack.slices[self.stack.names.index(self._felt)]
             self._feedback = tick.feedback[part]
-        self.simulation.step(tick.torque)
+        self.simulation.step(self.command(tick))
         return tick
+
+    def command(self, tick: Tick) -> Array:
+        """Torque that the team gets, shape (n,); another one than the law's in a comparison."""
+        return tick.torque
 
     def energy(self, tick: Tick, wrenches: Array) -> Energy:
         """Storage functions and rates of a tick, with wrenches on the tools, shape (N, 6)."""
