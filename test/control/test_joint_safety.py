@@ -170,6 +170,11 @@ def test_margins_of_narrow_joints_do_not_overlap():
     found, report = protect(safety, np.ones(4), q, np.array([0.1, 0.1, 0.1, 0.1]))
     np.testing.assert_array_equal(found, np.ones(4))
     assert not report.acted
+    q[0] = 1.95  # Another joint is repelled while the fixed one is where it has to be.
+    found, report = protect(safety, np.zeros(4), q)
+    assert np.isfinite(found).all()
+    assert report.repelled == (0,)
+    q[0] = 0.7
     for off in (-1e-3, 1e-3):
         q[3] = 1.0 + off
         found, report = protect(safety, np.zeros(4), q)
