@@ -11,9 +11,11 @@ from matplotlib.figure import Figure
 from noninteract_ros.analysis.energy_account import Account, account
 from noninteract_ros.analysis.paths import paths_figure
 from noninteract_ros.analysis.recorded import Recorded, Tracking, select
+from noninteract_ros.analysis.rendering import motion_figure
 from noninteract_ros.analysis.style import COLOURS, DASHES, new_figure, save, styled
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import RecordingError
+from noninteract_ros.subtasks.subtask import Subtask
 
 FEW = 3  # elements that can be told apart in one figure by colour
 BEFORE = 0.1  # share of the time after its start that a storage function is shown before it
@@ -43,6 +45,8 @@ def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
     except RecordingError as error:
         missing.append(str(error))
     files.append(save(paths_figure(recorded), folder / "paths.png"))
+    if not recorded.constant:
+        files.append(save(motion_figure(recorded), folder / "motion.png"))
     return files, missing
 
 
@@ -54,21 +58,36 @@ def tracking_figure(recorded: Recorded, subtask: str) -> Figure:
         RecordingError: The recording lacks the subtask's state or desired value.
     """
     tracking, task = recorded.tracking(subtask), recorded.task(subtask)
+    plain = task.layout.values
     shape = (len(tracking.t), len(task.elements), len(task.axes))
-    actual = tracking.actual.position.reshape(shape)
-    desired = tracking.desired.position.reshape(shape)
-    figure, rows = new_figure(1.0 + 1.45 * len(task.axes), len(task.axes))
-    for column, (axes, axis) in enumerate(zip(rows, task.axes, strict=True)):
+    actual = tracking.actual.position[:, plain].reshape(shape)
+    desired = tracking.desired.position[:, plain].reshape(shape)
+    count = len(task.axes) + task.rotates
+    figure, rows = new_figure(1.0 + 1.45 * count, count)
+    for column, axis in enumerate(task.axes):
+        axes = rows[column]
         draw_one = _draw_few if len(task.elements) <= FEW else _draw_many
         draw_one(axes, tracking, actual[:, :, column], desired[:, :, column], task.elements)
         axes.set_ylabel(f"{_quantity(subtask, task.elements)}\n{axis} [m]")
         axes.margins(x=0.0)
+    if task.rotates:
+        _draw_angles(rows[-1], tracking, task)
     rows[-1].set_xlabel("time [s]")
     figure.align_ylabels(rows)
     # Beside the curves there is no telling where room is; above the axes there always is.
     handles, labels = rows[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=min(len(labels), 4))
     return figure
+
+
+def _draw_angles(axes: Axes, tracking: Tracking, task: Subtask) -> None:
+    """Angle between actual and desired rotation of each element."""
+    e = task.layout.difference(tracking.actual.position, tracking.desired.position)
+    angles = np.linalg.norm(e[:, task.layout.angular], axis=2)
+    lines = axes.plot(tracking.t, angles, color=COLOURS[1], linewidth=1.0)
+    lines[0].set_label("angle error")
+    axes.set_ylabel("orientation\nerror [rad]")
+    axes.margins(x=0.0)
 
 
 def _quantity(subtask: str, elements: tuple[str, ...]) -> str:
