@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from noninteract_ros.analysis.arm_figures import limits_figure
 from noninteract_ros.analysis.energy_account import Account, account
 from noninteract_ros.analysis.paths import paths_figure
 from noninteract_ros.analysis.recorded import Recorded, Tracking, select
@@ -46,6 +47,7 @@ def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
         missing.append(str(error))
     files.append(save(paths_figure(recorded), folder / "paths.png"))
     if not recorded.constant:
+        files.append(save(limits_figure(recorded), folder / "limits.png"))
         files.append(save(motion_figure(recorded), folder / "motion.png"))
     return files, missing
 
