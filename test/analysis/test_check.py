@@ -77,13 +77,13 @@ def test_the_law_holds_on_unlike_arms() -> None:
     ("module", "name", "broken", "found"),
     [
         (
-            decoupling,
+            decoupling.TaskDynamics,
             "divide_by_inertias",
             lambda dynamics, force: force,
             {"both forms of the torque, noninteracting", "both forms of the torque, paper"},
         ),
         (
-            decoupling,
+            decoupling.TaskDynamics,
             "coriolis_force",
             lambda dynamics, e_rate: np.zeros_like(e_rate),
             {"both forms of the torque, noninteracting"},
