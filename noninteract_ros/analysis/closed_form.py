@@ -15,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from noninteract_ros.analysis.checks import Check, at_most, not_applicable
 from noninteract_ros.analysis.influences import Influence
-from noninteract_ros.analysis.recorded import Motion, Recorded, select
+from noninteract_ros.analysis.recorded import FRICTION, Motion, Recorded, select
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.decoupling import TaskDynamics, task_dynamics
 from noninteract_ros.control.impedance import stack_impedance
@@ -208,16 +208,23 @@ def closed_form_check(recorded: Recorded, subtask: str, found: ClosedForm | str)
 
 
 def _require(recorded: Recorded, subtask: str, outside: list[Influence]) -> None:
-    law = recorded.scenario.general.law
+    scenario, law = recorded.scenario, recorded.scenario.general.law
     foreign = [item.text for item in outside if item.subtask in ("", subtask)]
-    if law not in LAWS:
-        raise NotApplicableError(f"law {law} does not decouple")
-    if not recorded.constant:
-        raise NotApplicableError("the team's inertia is not constant")
-    if not recorded.lockstep:
-        raise NotApplicableError("wall time: ticks are not evenly spaced")
-    if foreign:
-        raise NotApplicableError(f"not in the scenario: {'; '.join(foreign)}")
+    on_tools = all(push.on_tool(recorded.team) for push in scenario.pushes.values())
+    changed = recorded.interventions()
+    reasons = {
+        f"law {law} does not decouple": law not in LAWS,
+        "the team's inertia is not constant": not recorded.constant,
+        "wall time: ticks are not evenly spaced": not recorded.lockstep,
+        f"the team touches {', '.join(scenario.surroundings)}": bool(scenario.surroundings),
+        "a push acts elsewhere than on a tool": not on_tools,
+        FRICTION: recorded.team.friction.any(),
+        f"limits of joints changed the torques of {changed} ticks": changed > 0,
+        f"not in the scenario: {'; '.join(foreign)}": bool(foreign),
+    }
+    for reason, holds in reasons.items():
+        if holds:
+            raise NotApplicableError(reason)
 
 
 def _led_motions(recorded: Recorded, subtask: str) -> Iterator[Motion]:

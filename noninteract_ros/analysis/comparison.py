@@ -18,7 +18,7 @@ from noninteract_ros.analysis.holding import (
     told_rows,
 )
 from noninteract_ros.analysis.influences import Influence
-from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.recorded import FRICTION, Recorded
 from noninteract_ros.analysis.rehearsals import Joints, Variant, rehearse_all
 from noninteract_ros.arrays import Array
 
@@ -172,6 +172,10 @@ class Comparer:
             return f"{', '.join(scenario.surroundings)} carries motions over"
         if scenario.pushes and not self._recorded.constant:
             return "what a push does depends on where the team is"
+        if self._recorded.team.friction.any():
+            return FRICTION
+        if ticks := self._recorded.interventions(self._side_s):
+            return f"singularities or limits of joints changed the torques of {ticks} ticks"
         return ""
 
     def _held_apart(self, without: Joints) -> tuple[Array, Array]:

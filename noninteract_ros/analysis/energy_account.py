@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 
 from noninteract_ros.analysis.checks import Check, at_least, at_most, not_applicable
 from noninteract_ros.analysis.holding import Holding
-from noninteract_ros.analysis.recorded import Motion, Recorded, common_instants, select
+from noninteract_ros.analysis.recorded import (
+    FRICTION,
+    INTERVENTIONS,
+    Motion,
+    Recorded,
+    common_instants,
+    select,
+)
 from noninteract_ros.arrays import Array
 from noninteract_ros.subtasks.layout import Layout
 
-INTERVENTIONS = "interventions"
 LAWS = ("noninteracting", "paper")
 GROWTH = 1e-8  # share of the peak at 1 kHz: what holding the torque over a tick can leave
 PASSIVE = 1e-3  # share of the peak at 1 kHz by which (31) may be missed for the same reason
@@ -99,11 +105,13 @@ def energy_metrics(
         "work_of_holding_J": held if holding else None,
     }
     coarse = 1000.0 / recorded.rate
+    # Where subtasks supply each other, what passes through one is not bounded by what it stores.
+    passing = _largest_storage(recorded) if _crossing(recorded) else peak
     supplied = (1.0 + UNEXPLAINED) * held
     claims = (
         ("growth", growth or 0.0, GROWTH * peak * coarse**3 + supplied, growth_reason),
         ("passive", excess, PASSIVE * peak * coarse + supplied, excess_reason),
-        ("rate", mismatch, SAMPLED * peak * coarse + UNEXPLAINED * held, blind),
+        ("rate", mismatch, SAMPLED * passing * coarse + UNEXPLAINED * held, blind),
     )
     checks = [at_least(f"storage_positive.{subtask}", lowest, 0.0, "J")]
     for claim, value, limit, reason in claims:
@@ -114,6 +122,12 @@ def energy_metrics(
             else at_most(name, value, limit, "J")
         )
     return metrics, checks
+
+
+def _largest_storage(recorded: Recorded) -> float:
+    """Peak of the storage functions of all subtasks [J]."""
+    series = [recorded.run.labelled(f"{name}/energy") for name in recorded.stack.names]
+    return max(float(item["storage"].max(initial=0.0)) for item in series)
 
 
 def _holding_work(recorded: Recorded, subtask: str, found: Account, holding: Holding) -> Array:
@@ -138,9 +152,14 @@ def _late(recorded: Recorded) -> str:
     return "" if known else "wall time: torques act late, on inertias that vary"
 
 
+def _rubbing(recorded: Recorded) -> str:
+    """Why the supply is not all told, or an empty text."""
+    return FRICTION if recorded.team.friction.any() else ""
+
+
 def _growth(recorded: Recorded, subtask: str, found: Account) -> tuple[float | None, str]:
     """Largest growth over any time with a still reference and nothing that acts from outside."""
-    if reason := _crossing(recorded):
+    if reason := _crossing(recorded) or _rubbing(recorded):
         return None, reason
     quiet = _still(found.desired) & _untouched(recorded, found.t) & found.in_force
     if not quiet.any():
@@ -168,7 +187,7 @@ def _against_supply(
     unseen = set(recorded.scenario.robots) - set(recorded.scenario.general.force_sensors)
     if loaded and unseen:
         return 0.0, 0.0, "the controller has no force sensors on every robot"
-    if reason := _late(recorded):
+    if reason := _late(recorded) or _rubbing(recorded):
         return 0.0, 0.0, reason
     excess = mismatch = 0.0
     told = ~_jumps(recorded.task(subtask).layout, found.desired)

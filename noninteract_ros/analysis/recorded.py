@@ -19,6 +19,9 @@ from noninteract_ros.scenario_file import nest
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.robot import AXES
 
+INTERVENTIONS = "interventions"
+FRICTION = "the joints have friction, which neither the law nor a sensor at a tool knows"
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -182,6 +185,17 @@ class Recorded:
         authority = self.scenario.subtasks[subtask].input.authority
         topic = f"{subtask}/{authority}/reference"
         return topic if self.has(topic) else None
+
+    def interventions(self, end: float = np.inf) -> int:
+        """Ticks up to a time [s] whose torque was another one than the law's, as it was told."""
+        topic = f"{self.stack.names[0]}/energy"
+        if not self.has(topic):
+            return 0
+        series = self.run.labelled(topic)
+        if INTERVENTIONS not in series.labels:
+            return 0
+        counts = series[INTERVENTIONS][self.since_start(series.stamps) <= end]
+        return int(counts.max(initial=0.0))
 
     def start(self, subtask: str) -> float | None:
         """Time of the first reference that leads a subtask [s]; None where there is none."""

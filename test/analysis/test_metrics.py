@@ -125,6 +125,12 @@ def test_the_natural_law_lets_errors_cross_over(tmp_path: Path) -> None:
     for name in ("noninteraction.human", "closed_form.relative", "storage_growth.relative"):
         assert by_name[name].passed is None
         assert "natural" in by_name[name].reason
+    # What passes through a subtask is bounded by what any of them stores.
+    limits = [by_name[f"storage_rate.{name}"].limit for name in ("cooperative", "relative")]
+    peaks = [
+        found.metrics["energy"][name]["storage_max_J"] for name in ("cooperative", "relative")
+    ]
+    assert limits[0] == limits[1] == pytest.approx(0.04 * max(peaks))
     moved = found.metrics["comparison"]["moved_m"]
     assert moved["natural"]["autonomy"]["cooperative"] > 1e-2
     assert moved["noninteracting"]["autonomy"]["cooperative"] < 1e-12

@@ -280,6 +280,18 @@ def test_torque_rate_holds_across_a_jump_of_the_state():
     assert (np.abs(torques) <= [20.0, 10.0, 20.0, 10.0]).all()
 
 
+def test_a_gap_between_states_counts_for_the_torque_rate():
+    """After 0.3 s without states the torque may be 60 N m from its last, and is at once."""
+    loop = Loop(team(plane="xz"), safety=SafetySettings(torque_rate=200.0))
+    loop.tick()
+    core = loop.controller
+    q = core.team.q0 + 0.05
+    tick = core.step(0.3, q, np.zeros(4))
+    assert tick.restarted.startswith("no state")
+    np.testing.assert_allclose(tick.torque, core.team.gravity(q), atol=1e-9)
+    assert np.abs(tick.torque - core.team.gravity(core.team.q0)).max() > 0.2
+
+
 def test_inputs_beyond_all_numbers_leave_the_torque_finite():
     """References of 1e200 and velocities of 1e160 overflow the law; brakes take over."""
     for v in (np.zeros(4), np.array([1e160, 0.0, 0.0, 0.0])):
