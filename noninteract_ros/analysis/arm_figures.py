@@ -13,18 +13,23 @@ from noninteract_ros.arrays import Array
 
 @styled
 def limits_figure(recorded: Recorded) -> Figure:
-    """Torques as a share of their limits, and the smallest singular value of the task Jacobian."""
+    """Torques, and the smallest singular value of the task Jacobian.
+
+    Torques are shares of their limits, if any joint has one.
+    """
     figure, (shares, values) = new_figure(4.6, 2)
     rows = told_rows(recorded)
-    t, torque = recorded.t[rows], np.abs(recorded.torque[rows]) / recorded.team.effort_limits
+    limits = recorded.team.effort_limits
+    limited = bool(np.isfinite(limits).any())
+    t, torque = recorded.t[rows], np.abs(recorded.torque[rows]) / (limits if limited else 1.0)
     for number, (name, part) in enumerate(
         zip(recorded.team.names, recorded.team.velocity_slices, strict=True)
     ):
         colour = COLOURS[number % len(COLOURS)]
         shares.plot(t, torque[:, part], color=colour, linewidth=0.5, alpha=0.6)
         shares.plot(t, torque[:, part].max(axis=1), color=colour, label=f"{name}, largest")
-    shares.set_ylabel("torque\n[share of its limit]")
-    shares.set_ylim(0.0, 1.05)
+    shares.set_ylabel("torque\n[share of its limit]" if limited else "torque [N, N m]")
+    shares.set_ylim(0.0, 1.05 if limited else None)
     shares.legend(loc="best", ncols=2)
     values.plot(t, _smallest_singular_values(recorded, rows), color=COLOURS[0])
     values.set_ylim(bottom=0.0)

@@ -174,14 +174,21 @@ def _aligned(recorded: Recorded, subtask: str) -> tuple[Array, Account]:
 
 
 def _shown(recorded: Recorded) -> float:
-    """Time until every storage function has settled, with as much again to see it [s]."""
+    """Time until every storage function has settled, with as much again to see it [s].
+
+    All of the time, where one does not settle.
+    """
     settled = []
     for name in recorded.stack.names:
         t, found = _aligned(recorded, name)
-        level = found.storage[-len(found.storage) // 4 :].max(initial=0.0)
-        above = found.storage > level + 0.02 * found.storage.max(initial=0.0)
-        settled.append(t[np.flatnonzero(above)[-1]] if above.any() else 0.0)
         longest = t[-1] if len(t) else 0.0
+        level = found.storage[-len(found.storage) // 4 :].max(initial=0.0)
+        peak = found.storage.max(initial=0.0)
+        above = found.storage > level + 0.02 * peak
+        if level > 0.5 * peak:  # It does not settle.
+            settled.append(longest)
+        else:
+            settled.append(t[np.flatnonzero(above)[-1]] if above.any() else 0.0)
     return float(np.clip(2.0 * max(settled), min(1.0, longest), longest)) or 1.0
 
 

@@ -78,6 +78,21 @@ def test_the_papers_figure_4(pair: Recorded) -> None:
         assert data[0, 1] == pytest.approx(data[:, 1].max(), rel=0.01)
 
 
+def test_storage_that_does_not_settle_is_shown_to_the_end(tmp_path: Path) -> None:
+    """A push at the end of a run is in the figure; one that has decayed ends it earlier."""
+    shown = []
+    for start in (0.02, 1.8):
+        push = {"robot": "robot_1", "start": start, "duration": 0.1, "force": [200.0, 0.0, 0.0]}
+        values = scenario_values(object=None, haptic__motion="still", haptic__centre=[0.0, 0.0])
+        values |= {"pushes": ["shove"], "shove": push}
+        values["cooperative"]["stiffness"] = [200.0]  # Else it would not have settled in 2 s.
+        values["planner"]["pair"] = {"time": 0.0, "value": [0.6, 0.8]}
+        run = Recorded(record(tmp_path, values, 2.0))
+        shown.append(storage_figure(run).axes[0].get_xlim()[1])
+    assert shown[0] < 1.9
+    assert shown[1] == pytest.approx(1.99, abs=0.02)
+
+
 def test_paths_pass_through_the_tool_points(pair: Recorded) -> None:
     """One path a robot in the plane, to scale, with formations on it."""
     figure = paths_figure(pair)
