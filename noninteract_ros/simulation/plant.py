@@ -84,33 +84,28 @@ class Plant:
         none = np.zeros(self.model.nv)
         if not self.couplings and not pushes:
             return Outside(none, none, ())
-        pin.forwardKinematics(self.model, self._data, q, v)
-        pin.computeJointJacobians(self.model, self._data)
+        pin.computeJointJacobians(self.model, self._data, q)
         coupling_torque, effects = none.copy(), []
         for coupling, frames in zip(self.couplings, self._frames, strict=True):
-            effect = coupling.effect(tuple(self._motion(frame) for frame in frames))
+            jacobians = [self._jacobian(frame) for frame in frames]
+            motions = [self._motion(*pair, v) for pair in zip(frames, jacobians, strict=True)]
+            effect = coupling.effect(tuple(motions))
             effects.append(effect)
-            for frame, wrench in zip(frames, effect.wrenches, strict=True):
-                if wrench.any():
-                    coupling_torque += self._jacobian(frame).T @ wrench
+            for J, wrench in zip(jacobians, effect.wrenches, strict=True):
+                coupling_torque += J.T @ wrench
         push_torque = none.copy()
         for push in pushes:
-            wrench = self._in_world_axes(push)
-            push_torque += self._jacobian(self._frame(push.frame)).T @ wrench
+            J = self._jacobian(self._frame(push.frame))
+            push_torque += J.T @ self._in_world_axes(push)
         return Outside(coupling_torque, push_torque, tuple(effects))
 
     def _jacobian(self, frame: int) -> Array:
         return pin.getFrameJacobian(self.model, self._data, frame, AXES).reshape(6, -1)
 
-    def _motion(self, frame: int) -> FrameMotion:
+    def _motion(self, frame: int, J: Array, v: Array) -> FrameMotion:
         placement = pin.updateFramePlacement(self.model, self._data, frame)
-        velocity = pin.getFrameVelocity(self.model, self._data, frame, AXES)
-        return FrameMotion(
-            placement.translation.copy(),
-            placement.rotation.copy(),
-            velocity.linear.copy(),
-            velocity.angular.copy(),
-        )
+        twist = J @ v
+        return FrameMotion(placement.translation, placement.rotation, twist[:3], twist[3:])
 
     def _in_world_axes(self, push: Push) -> Array:
         if not push.in_frame_axes:
