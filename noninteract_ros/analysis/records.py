@@ -147,6 +147,14 @@ def split_records(data: bytes) -> Iterator[tuple[int, bytes]]:
         at += length
 
 
+def opened(opcode: int, body: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yields the records inside a chunk; any other record is yielded itself."""
+    if opcode == Opcode.CHUNK:
+        yield from split_records(unpack_chunk(body))
+    else:
+        yield opcode, body
+
+
 def stored_message(body: bytes) -> StoredMessage:
     """Reads a message record."""
     channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)

@@ -107,11 +107,8 @@ class _Copy:
 
     def _guarded(self, opcode: int, body: bytes) -> None:
         try:
-            if opcode == Opcode.CHUNK:
-                for inner, content in records.split_records(records.unpack_chunk(body)):
-                    self._add(inner, content)
-            else:
-                self._add(opcode, body)
+            for inner, content in records.opened(opcode, body):
+                self._add(inner, content)
         except KeyError as error:
             self._lose(body, f"no channel or schema {error}")
         except (records.DamagedError, *records.DAMAGE) as error:

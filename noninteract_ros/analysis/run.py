@@ -219,11 +219,8 @@ class _Loader:
             RecordingError: It is damaged.
         """
         try:
-            if opcode == Opcode.CHUNK:
-                for inner, content in records.split_records(records.unpack_chunk(body)):
-                    self._add(inner, content)
-            else:
-                self._add(opcode, body)
+            for inner, content in records.opened(opcode, body):
+                self._add(inner, content)
         except (records.DamagedError, KeyError, *records.DAMAGE) as error:
             raise RecordingError(
                 f"{self.path}: is damaged ({error}); try: noninteract repair {self.path}"
