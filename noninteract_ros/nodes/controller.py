@@ -21,6 +21,7 @@ from noninteract_ros.control.reference import Reference
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.cdr import JointStateCodec
+from noninteract_ros.nodes.chronicle import Chronicle
 from noninteract_ros.nodes.controller_parameters import LiveParameters
 from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder, state_lead
 from noninteract_ros.nodes.messages import Level, Marker, ParsedReference, SubtaskCodec
@@ -56,12 +57,9 @@ class Controller(ScenarioNode):
         self._missing: list[str] = []
         self._answered: tuple[int, bytes] | None = None
         self._now = 0.0
-        self._cycle_times: deque[float] = deque(maxlen=1000)
-        self._restart = ""
-        self._silent: dict[str, bool] = {}
-        self._conditions: list[str] = []
         self._command_to = self.create_publisher(JointState, "joint_commands", LOOP_QOS)
         self._telemetry = Telemetry(self, team, stack)
+        self._chronicle = Chronicle(self, self.core, self._telemetry)
         self._live = LiveParameters(self, self.core, self._post)
         self._watch = SourceWatch(
             general.lockstep_sources if self.lockstep else (),
@@ -200,25 +198,9 @@ class Controller(ScenarioNode):
         command = self._commands.encode(stamp, effort=tick.torque)
         self._command_to.publish(command)
         self._answered = (stamp, command)
-        silent = {name: led.silent for name, led in zip(self.core.inputs, tick.led, strict=True)}
         self._telemetry.publish(stamp, self.core, tick)
-        self._note(tick.restarted, silent, self._telemetry.safety.conditions(seconds(stamp)))
-        self._cycle_times.append(time.perf_counter() - began)
-
-    def _note(self, restarted: str, silent: dict[str, bool], conditions: list[str]) -> None:
-        """Logs what changed: a new start, a source that went silent or came back, limits."""
-        if conditions != self._conditions:
-            self._conditions = conditions
-            self.get_logger().warning("; ".join(conditions) or "within all limits again")
-        if restarted:
-            self._restart = restarted
-            self.get_logger().info(f"every subtask holds where it is: {restarted}")
-        for name, is_silent in silent.items():
-            if is_silent != self._silent.get(name, is_silent):
-                source = self.core.inputs[name].authority
-                text = "is silent: the subtask holds" if is_silent else "speaks again"
-                self.get_logger().info(f"{name}: {source} {text}")
-        self._silent = silent
+        self._chronicle.note(seconds(stamp), tick)
+        self._chronicle.cycle_times.append(time.perf_counter() - began)
 
     def loop(self) -> None:
         """Wall time: answers the newest state once per period."""
@@ -243,38 +225,10 @@ class Controller(ScenarioNode):
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
         """State machine, cycle times, condition of the subtasks, silent sources."""
-        age = time.monotonic() - self._state_at
-        mode = self.core.mode
-        values: dict[str, object] = {
-            "law": mode.law,
-            "time [s]": self._now,
-            "state age [s]": age,
-            "last start": self._restart or "none",
-        }
-        if self._cycle_times:
-            times = 1e6 * np.array(self._cycle_times)
-            values["cycle time, median [us]"] = float(np.median(times))
-            values["cycle time, maximum [us]"] = float(times.max())
-        for name, item in self.core.inputs.items():
-            silent = self._silent.get(name, False)
-            values[f"{name} led by"] = item.authority + (", silent" if silent else "")
-        values |= self._telemetry.condition()
-        if self._state is None:
-            return Level.WARN, "waiting for the first state of the team", values
-        if age > max(1.0, self.scenario.general.state_timeout):
-            return Level.ERROR, "holding: no states of the team", values
-        if mode.stopped:
-            return Level.WARN, "stopped", values
-        if self._missing and time.monotonic() - self._waiting_since > WAIT_SHOWN:
-            return Level.WARN, f"waiting for {', '.join(self._missing)}", values
-        if self._watch.absent:
-            return Level.WARN, f"running without {', '.join(sorted(self._watch.absent))}", values
-        if conditions := self._telemetry.safety.conditions(self._now):
-            return Level.WARN, "; ".join(conditions), values
-        silent_ones = [name for name, is_silent in self._silent.items() if is_silent]
-        if silent_ones:
-            return Level.WARN, f"holding {', '.join(silent_ones)}: source silent", values
-        return Level.OK, "running", values
+        now = time.monotonic()
+        waiting = self._missing if now - self._waiting_since > WAIT_SHOWN else []
+        age = None if self._state is None else now - self._state_at
+        return self._chronicle.status(self._now, age, waiting, self._watch.absent)
 
 
 def _reference(parsed: ParsedReference | Marker, dim: int) -> tuple[int, Motion | None]:
