@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from noninteract_ros.errors import InputError
 
@@ -81,17 +81,26 @@ class Feed:
         self._node = node
         self._type = message_type(type_name)
         self._reliability = ReliabilityPolicy.RELIABLE
+        self._durability = DurabilityPolicy.VOLATILE
         self._subscription = self._subscribe()
 
     def match_publishers(self) -> None:
-        """Asks for less where a publisher offers less: else nothing of it would arrive."""
-        best_effort = ReliabilityPolicy.BEST_EFFORT
-        if self._reliability == best_effort:
-            return
-        offers = self._node.get_publishers_info_by_topic(self.topic)
-        if any(offer.qos_profile.reliability == best_effort for offer in offers):
-            self._node.destroy_subscription(self._subscription)
+        """Asks for less where a publisher offers less: else nothing of it would arrive.
+
+        Where all keep what they said for who comes later, it is asked for.
+        """
+        best_effort, kept = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL
+        asked = (self._reliability, self._durability)
+        offers = [
+            offer.qos_profile for offer in self._node.get_publishers_info_by_topic(self.topic)
+        ]
+        if any(offer.reliability == best_effort for offer in offers):
             self._reliability = best_effort
+        if offers:
+            all_kept = all(offer.durability == kept for offer in offers)
+            self._durability = kept if all_kept else DurabilityPolicy.VOLATILE
+        if asked != (self._reliability, self._durability):
+            self._node.destroy_subscription(self._subscription)
             self._subscription = self._subscribe()
 
     def drain(self, store: Store) -> int:
@@ -117,7 +126,7 @@ class Feed:
         store(self.topic, self.type_name, received, sent, data, number)
 
     def _subscribe(self) -> Any:
-        qos = QoSProfile(depth=DEPTH, reliability=self._reliability)
+        qos = QoSProfile(depth=DEPTH, reliability=self._reliability, durability=self._durability)
         return self._node.create_subscription(self._type, self.topic, _unused, qos, raw=True)
 
 

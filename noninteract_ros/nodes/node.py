@@ -14,7 +14,7 @@ from rclpy.clock import Clock, ClockType
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.task import Future
 
 from noninteract_ros.errors import InputError
@@ -26,6 +26,8 @@ from noninteract_ros.scenario_file import nest
 NAMESPACE = "team"
 # Reliable, and so deep that a reader who is kept waiting, as a recorder may be, misses no tick.
 LOOP_QOS = QoSProfile(depth=1000)
+# What is said once and holds: who comes later hears it too.
+LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DIAGNOSTICS_PERIOD = 0.5
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 LOG_PERIOD = 2.0

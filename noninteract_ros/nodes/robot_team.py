@@ -12,6 +12,7 @@ import numpy as np
 from geometry_msgs.msg import WrenchStamped
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from noninteract_ros.clock import seconds, tick_stamp
@@ -21,7 +22,7 @@ from noninteract_ros.nodes import messages
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.lockstep import StampOrder
 from noninteract_ros.nodes.messages import Level
-from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
+from noninteract_ros.nodes.node import LATCHED_QOS, LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 
 RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is sent again
@@ -54,6 +55,7 @@ class RobotTeam(ScenarioNode):
         self._braking = False
         self._end_tick = round(general.end_time * general.rate) if general.end_time else None
         self._publish_to = self.create_publisher(JointState, "joint_states", LOOP_QOS)
+        self._describe()
         self._wrenches = [
             self.create_publisher(WrenchStamped, f"{name}/external_wrench", LOOP_QOS)
             for name in team.names
@@ -72,6 +74,12 @@ class RobotTeam(ScenarioNode):
         self.create_service(Trigger, "~/reset", self._guarded(self._reset))
         if self.lockstep:
             self.every(RESEND_PERIOD, self._resend)
+
+    def _describe(self) -> None:
+        """Publishes the robots' URDFs, for whoever draws them, now or later."""
+        for name, block in self.scenario.robots.items():
+            publisher = self.create_publisher(String, f"{name}/robot_description", LATCHED_QOS)
+            publisher.publish(String(data=block.description(name)))
 
     def _on_command(self, data: bytes) -> None:
         stamp, _, _, effort = self._commands.decode(data)

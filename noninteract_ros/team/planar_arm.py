@@ -10,6 +10,7 @@ from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import key
 from noninteract_ros.team.arm_settings import ArmSettings
 from noninteract_ros.team.robot import AXES, Robot
+from noninteract_ros.team.urdf_text import urdf_text
 
 TOOL = "tool"
 
@@ -59,6 +60,10 @@ class PlanarArm(ArmSettings):
             place = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
         model.addFrame(pin.Frame(TOOL, parent, place, pin.FrameType.OP_FRAME))
         return self.arm(name, model, TOOL)
+
+    def description(self, name: str) -> str:
+        """Its URDF, in the frame of its base."""
+        return urdf_text(self.build(name))
 
     def _body(self, length: float, mass: float) -> pin.Inertia:
         """Inertia of a link along x from its joint."""

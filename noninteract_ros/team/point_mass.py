@@ -10,6 +10,7 @@ from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import join, key
 from noninteract_ros.team.joint_settings import JointSettings, configuration_within
 from noninteract_ros.team.robot import AXES, Robot, position_limits
+from noninteract_ros.team.urdf_text import urdf_text
 
 PRISMATIC = {"x": pin.JointModelPX, "y": pin.JointModelPY, "z": pin.JointModelPZ}
 
@@ -48,3 +49,7 @@ class PointMass(JointSettings):
         limits = position_limits(model)
         start = configuration_within(path, self.initial_position, model, limits)
         return Robot(name, model, "tool", start, self.axes, self.brake_damping)
+
+    def description(self, name: str) -> str:
+        """Its URDF, in the world: a ball."""
+        return urdf_text(self.build(name))

@@ -15,6 +15,9 @@ class RobotBlock(Protocol):
     def build(self, name: str) -> Robot:
         """The robot."""
 
+    def description(self, name: str) -> str:
+        """Its URDF, in the frame of its base."""
+
 
 ROBOT_MODELS: dict[str, type[RobotBlock]] = {
     "point_mass": PointMass,

@@ -51,7 +51,7 @@ class UrdfRobot(ArmSettings):
                 join(name, "urdf"), f"{found} of urdf and urdf_text", "one of them"
             )
         path = join(name, "urdf" if self.urdf else "urdf_text")
-        text = read_urdf(path, self.urdf) if self.urdf else self.urdf_text
+        text = self.description(name)
         _check_joints(path, text, self.locked_joints)
         try:
             model = pin.buildModelFromXML(text)
@@ -66,6 +66,14 @@ class UrdfRobot(ArmSettings):
             allowed = one_of(frames, self.tool_frame)
             raise ScenarioError(join(name, "tool_frame"), repr(self.tool_frame), allowed)
         return self.arm(name, model, self.tool_frame)
+
+    def description(self, name: str) -> str:
+        """The URDF as it was given, in the frame of its base.
+
+        Raises:
+            ScenarioError: The file cannot be read.
+        """
+        return read_urdf(join(name, "urdf"), self.urdf) if self.urdf else self.urdf_text
 
     def _locked_configuration(self, name: str, model: pin.Model) -> np.ndarray:
         """Configuration of all joints in which the locked ones are where they are to be."""

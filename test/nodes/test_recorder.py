@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import rclpy
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 
@@ -245,6 +245,17 @@ def test_best_effort_publishers_are_heard(ros: Any, tmp_path: Path) -> None:
     poll_until(recorder, heard)
     recorder.finish()
     assert "/team/sensor" in Run.open(tmp_path).topics
+
+
+def test_what_was_said_once_before_the_recorder_is_kept(ros: Any, tmp_path: Path) -> None:
+    """A latched message, such as a robot's description, is recorded by who comes later."""
+    node, make = ros
+    qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node.create_publisher(JointState, "latched", qos).publish(JointState(name=["a"]))
+    recorder = make(tmp_path / "run.mcap")
+    poll_until(recorder, lambda: recorder.writer.topics == 2)
+    recorder.finish()
+    assert "/team/latched" in Run.open(tmp_path).topics
 
 
 def test_an_unknown_type_is_left_out(ros: Any, tmp_path: Path) -> None:

@@ -9,11 +9,13 @@ from geometry_msgs.msg import WrenchStamped
 from harness import Ros, go, paper, until
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
 from noninteract_ros.clock import tick_stamp
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.messages import to_wrench_stamped
+from noninteract_ros.nodes.node import LATCHED_QOS
 
 JOINTS = ["robot_1/x", "robot_1/y", "robot_2/x", "robot_2/y"]
 ALONE: dict[str, Any] = {"object": None, "haptic": None, "planner": None, "lockstep_sources": None}
@@ -161,3 +163,18 @@ def test_without_commands_the_team_brakes_in_wall_time(ros: Ros) -> None:
     until(push_on, "the team moves again")
     bench.publish(1, [3.0] * 4)
     until(lambda: "goes back" in bench.ear.value("robot_team", "last refusal"))
+
+
+def test_descriptions_are_there_for_whoever_comes_later(ros: Ros) -> None:
+    """Each robot's URDF is heard after it was published, under the robot's name."""
+    Bench(ros)
+    heard: dict[str, str] = {}
+    for name in ("robot_1", "robot_2"):
+
+        def note(message: String, name: str = name) -> None:
+            heard[name] = message.data
+
+        ros.probe.create_subscription(String, f"{name}/robot_description", note, LATCHED_QOS)
+    until(lambda: len(heard) == 2, "both descriptions")
+    for name, text in heard.items():
+        assert f'<robot name="{name}">' in text
