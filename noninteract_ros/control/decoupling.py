@@ -82,6 +82,14 @@ class TaskDynamics:
         u = self.S @ e_rate
         return self.S.T @ (self.C @ u - self.MS @ (self.J_rate @ u))
 
+    def force_of(self, torque: Array) -> Array:
+        """S' tau, shape (n,) [N]: the forces on the subtasks that a joint torque amounts to."""
+        return self.S.T @ torque
+
+    def multiply_by_inertia(self, acceleration: Array) -> Array:
+        """Lambda a, shape (n,)."""
+        return self.inertia @ acceleration
+
     def divide_by_inertia(self, force: Array) -> Array:
         """Lambda^-1 f, shape (n,)."""
         return np.linalg.solve(self.inertia, force)
@@ -166,6 +174,14 @@ def inverse(J: Array) -> Array:
     except np.linalg.LinAlgError:
         size = float(np.abs(J).max()) or 1.0
         return np.linalg.inv(J + 1e-9 * size * np.eye(len(J)))
+
+
+def inverses(blocks: Array) -> Array:
+    """Inverses of square blocks, shape (N, m, m); of singular ones as `inverse` has them."""
+    try:
+        return np.linalg.inv(blocks)
+    except np.linalg.LinAlgError:
+        return np.array([inverse(block) for block in blocks])
 
 
 def commanded_acceleration(

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.decoupling import TaskDynamics, inverse, task_terms
+from noninteract_ros.control.decoupling import TaskDynamics, inverses, task_terms
 from noninteract_ros.control.mixing_terms import MixingTerms
 from noninteract_ros.control.robot_terms import RobotByRobot, RobotTerms
 
@@ -82,7 +82,7 @@ class StructuredDynamics(TaskDynamics):
         v: Array,
         desired_inertias: tuple[Array | None, ...],
     ) -> None:
-        T_inverse = _inverses(T)
+        T_inverse = inverses(T)
         v_own = robots.padded(v[:, None])
         values = {
             "robots": robots,
@@ -172,6 +172,15 @@ class StructuredDynamics(TaskDynamics):
     def natural_coriolis_force(self, e_rate: Array) -> Array:
         """mu e_rate, shape (n,)."""
         return self._coriolis(e_rate[:, None])[:, 0]
+
+    def force_of(self, torque: Array) -> Array:
+        """S' tau = A^-T T^-T tau, shape (n,)."""
+        own = self.robots.padded(torque[:, None])
+        return self._stacked_force(self.T_inverse.transpose(0, 2, 1) @ own)[:, 0]
+
+    def multiply_by_inertia(self, acceleration: Array) -> Array:
+        """Lambda a = A^-T L A^-1 a, shape (n,)."""
+        return self._stacked_force(self.L @ self._own(acceleration[:, None]))[:, 0]
 
     def divide_by_inertia(self, force: Array) -> Array:
         """Lambda^-1 f = A L^-1 A' f, shape (n,)."""
@@ -286,11 +295,3 @@ class StructuredDynamics(TaskDynamics):
         stacked[places.mean], stacked[places.edges] = c, r
         stacked[places.joints] = own.reshape(-1, own.shape[-1])[places.slots]
         return stacked
-
-
-def _inverses(blocks: Array) -> Array:
-    """Inverses of blocks; of singular ones those of neighbours, with very large entries."""
-    try:
-        return np.linalg.inv(blocks)
-    except np.linalg.LinAlgError:
-        return np.array([inverse(block) for block in blocks])
