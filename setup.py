@@ -10,6 +10,7 @@ NODES = ("robot_team", "haptic_emulator", "relative_planner", "controller", "rec
 PROGRAMS = {node: f"{NAME}.nodes.{node}:main" for node in NODES}
 PROGRAMS["noninteract"] = f"{NAME}.cli:main"
 ROBOTS = ["example-robot-data>=6.0"]  # Models of arms: 130 MB to download, 440 MB on disk.
+PEER = ["mujoco>=4.0"]  # Another simulator's dynamics, to test against: 20 MB to download.
 
 setup(
     name=NAME,
@@ -46,8 +47,10 @@ setup(
     ],
     extras_require={
         "robots": ROBOTS,
+        "peer": PEER,
         "dev": [
             *ROBOTS,
+            *PEER,
             "ruff>=0.17,<0.18",  # Another minor release formats differently.
             "mypy>=2.4",
             "pytest>=9.2",

@@ -35,10 +35,14 @@ class Programs:
 
     def start(self, name: str, values: Mapping[str, Any]) -> subprocess.Popen[str]:
         """One of the stack's programs, with a scenario."""
+        parameters = ["--ros-args", "--params-file", str(self.write(values))]
+        return self.python(name, "-m", f"noninteract_ros.nodes.{name}", *parameters)
+
+    def write(self, values: Mapping[str, Any]) -> Path:
+        """A scenario's file."""
         file = self._folder / "scenario.yaml"
         file.write_text(dump({"/**": {"ros__parameters": dict(values)}}))
-        parameters = ["--ros-args", "--params-file", str(file)]
-        return self.python(name, "-m", f"noninteract_ros.nodes.{name}", *parameters)
+        return file
 
     def python(self, name: str, *arguments: str) -> subprocess.Popen[str]:
         """A Python program."""
