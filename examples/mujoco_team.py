@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plant of one's own in the place of robot_team: MuJoCo's dynamics of a scenario's URDF robots.
 
-MuJoCo reads the URDF by itself; nothing touches anything. `_on_command` is all that lockstep needs.
+MuJoCo reads the URDF by itself; nothing touches anything. `_on_command` is all of lockstep.
 With the extra `peer`: python examples/mujoco_team.py config/dual_panda_free.yaml
 """
 
