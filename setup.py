@@ -42,6 +42,7 @@ setup(
         "mcap-ros2-support>=0.6",
         "scipy>=1.17",
         "matplotlib>=3.11",
+        "pillow>=12.0",
         "typer>=0.29",
         "rich>=15.0",
     ],

@@ -12,7 +12,7 @@ from noninteract_ros.analysis.arm_figures import limits_figure
 from noninteract_ros.analysis.energy_account import Account, account
 from noninteract_ros.analysis.paths import paths_figure
 from noninteract_ros.analysis.recorded import Recorded, Tracking, select
-from noninteract_ros.analysis.rendering import motion_figure
+from noninteract_ros.analysis.rendering import Film, motion_figure, save_animation
 from noninteract_ros.analysis.style import COLOURS, DASHES, new_figure, save, styled
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import RecordingError
@@ -27,7 +27,7 @@ def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
 
     Args:
         recorded: The run.
-        folder: Where the PNG files go; it exists.
+        folder: Where the files go; it exists.
 
     Returns:
         The files, and why the others are missing.
@@ -48,7 +48,12 @@ def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
     files.append(save(paths_figure(recorded), folder / "paths.png"))
     if not recorded.constant:
         files.append(save(limits_figure(recorded), folder / "limits.png"))
-        files.append(save(motion_figure(recorded), folder / "motion.png"))
+    try:
+        film = Film(recorded)
+        files.append(save(motion_figure(film), folder / "motion.png"))
+        files.append(save_animation(film, folder / "motion.gif"))
+    except RecordingError as error:
+        missing.append(str(error))
     return files, missing
 
 

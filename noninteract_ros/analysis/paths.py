@@ -72,7 +72,7 @@ def _draw_formations(axes: Axes, recorded: Recorded, t: Array, plan: Array) -> N
     times = times[(times >= t[0]) & (times <= t[-1])]
     instants = np.searchsorted(t, times - 1e-9)
     labelled: list[Array] = []
-    edges = _edges(recorded)
+    edges = edges_of(recorded)
     for step, (time, row) in enumerate(zip(times, instants, strict=True)):
         shade = f"{0.7 * (1.0 - step / max(1, len(times) - 1)):.3f}"
         for first, second in edges:
@@ -94,7 +94,7 @@ def _draw_formations(axes: Axes, recorded: Recorded, t: Array, plan: Array) -> N
             )
 
 
-def _edges(recorded: Recorded) -> list[tuple[int, int]]:
+def edges_of(recorded: Recorded) -> list[tuple[int, int]]:
     """Pairs of robots that a subtask relates to each other."""
     names = recorded.team.names
     pairs = (element.split("-") for task in recorded.stack.subtasks for element in task.elements)

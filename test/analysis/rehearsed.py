@@ -102,7 +102,9 @@ class _Recording:
         self._period = round(self._rate / scenario.general.telemetry_rate)
         team, stack = self._rehearsal.team, self._rehearsal.stack
         self._joints = JointStateCodec(team.joint_names)
-        self._codecs = [SubtaskCodec(t.name, t.elements, t.axes) for t in stack.subtasks]
+        self._codecs = [
+            SubtaskCodec(t.name, t.elements, t.axes, t.rotates) for t in stack.subtasks
+        ]
         self._energy = EnergyCodec(ENERGY_LABELS)
         self._interventions = 0
         self._narrators = []
@@ -125,7 +127,8 @@ class _Recording:
         simulation = self._rehearsal.simulation
         for tick in range(round(duration * self._rate)):
             now = tick_stamp(tick, self._rate)
-            q, v, effort = simulation.q, simulation.v, simulation.torque
+            q = self._rehearsal.team.joints_from_configuration(simulation.q)
+            v, effort = simulation.v, simulation.torque
             wrenches = simulation.external_wrenches()
             result = self._rehearsal.step()
             self._interventions += result.intervened
@@ -166,10 +169,10 @@ class _Recording:
             )  # fmt: skip
         energy = self._rehearsal.energy(tick, wrenches)
         for i, (codec, part) in enumerate(zip(self._codecs, stack.slices, strict=True)):
-            wanted = tick.led[i].reference
+            wanted, values = tick.led[i].reference, stack.value_slices[i]
             encode = lambda *a, c=codec: c.encode(now, *a)  # noqa: E731
             self._add(
-                f"{codec.name}/state", MOTION, now, encode, tick.task.x[part], tick.x_rate[part]
+                f"{codec.name}/state", MOTION, now, encode, tick.task.x[values], tick.x_rate[part]
             )
             self._add(
                 f"{codec.name}/desired", MOTION, now, encode,

@@ -126,23 +126,26 @@ def test_teams_on_other_axes(tmp_path: Path, axes: list[str], expected: str) -> 
 
 
 def test_files_are_written_and_what_is_missing_is_named(pair: Recorded, tmp_path: Path) -> None:
-    """All four figures are PNGs of some size; without telemetry the reason is given."""
+    """All figures are pictures of some size; without telemetry the reason is given."""
     files, missing = draw(pair, tmp_path)
     assert [file.name for file in files] == [
         "fig2_cooperative.png",
         "fig3_relative.png",
         "fig4_storage.png",
         "paths.png",
+        "motion.png",
+        "motion.gif",
     ]
     assert missing == []
     for file in files:
-        assert file.read_bytes().startswith(b"\x89PNG")
+        kind = b"GIF" if file.suffix == ".gif" else b"\x89PNG"
+        assert file.read_bytes().startswith(kind)
         assert file.stat().st_size > 10_000
 
     def bare(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
         return arrays if topic.startswith("joint") else None
 
     files, missing = draw(Recorded(record(tmp_path, scenario_values(), 0.2, bare)), tmp_path)
-    assert [file.name for file in files] == ["paths.png"]
+    assert [file.name for file in files] == ["paths.png", "motion.png", "motion.gif"]
     assert len(missing) == 3
     assert "cooperative/state is not in the recording" in missing[0]
