@@ -6,7 +6,14 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "noninteract_ros"
-NODES = ("robot_team", "haptic_emulator", "relative_planner", "controller", "recorder")
+NODES = (
+    "robot_team",
+    "haptic_emulator",
+    "relative_planner",
+    "controller",
+    "operator_console",
+    "recorder",
+)
 PROGRAMS = {node: f"{NAME}.nodes.{node}:main" for node in NODES}
 PROGRAMS["noninteract"] = f"{NAME}.cli:main"
 ROBOTS = ["example-robot-data>=6.0"]  # Models of arms: 130 MB to download, 440 MB on disk.
@@ -21,7 +28,7 @@ setup(
     maintainer_email="maintainers@example.org",
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed"]},
+    package_data={NAME: ["py.typed", "console/static/*"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
@@ -45,6 +52,7 @@ setup(
         "pillow>=12.0",
         "typer>=0.29",
         "rich>=15.0",
+        "websockets>=15.0",
     ],
     extras_require={
         "robots": ROBOTS,
@@ -54,6 +62,7 @@ setup(
             *PEER,
             "ruff>=0.17,<0.18",  # Another minor release formats differently.
             "mypy>=2.4",
+            "playwright>=1.60",  # Drives the console's page in Chromium, where that is installed.
             "pytest>=9.2",
             "pytest-xdist>=3.8",
             "types-PyYAML>=6.0",

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from noninteract_ros.console.settings import ConsoleSettings
 from noninteract_ros.control.inputs import SOURCES
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.team_controller import TeamController
@@ -51,6 +52,7 @@ class Scenario:
         pushes: Scheduled pushes, by name.
         surroundings: Objects, doors and walls, by name.
         safety: Behaviour at singularities and joint limits.
+        console: The operator's console, or None.
     """
 
     general: General
@@ -63,6 +65,7 @@ class Scenario:
     pushes: Mapping[str, ScheduledPush]
     surroundings: Mapping[str, SurroundingBlock]
     safety: SafetySettings
+    console: ConsoleSettings | None
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "Scenario":
@@ -89,6 +92,7 @@ class Scenario:
                 for name in general.surroundings
             },
             load_optional(SafetySettings, values, "safety") or SafetySettings(),
+            load_optional(ConsoleSettings, values, "console"),
         )
         scenario.check()
         return scenario
@@ -98,7 +102,7 @@ class Scenario:
         blocks: list[tuple[str, object | None]] = [("", self.general)]
         blocks += [*self.robots.items(), *self.pushes.items(), *self.surroundings.items()]
         blocks += [("object", self.held), ("haptic", self.haptic), ("planner", self.planner)]
-        blocks += [("safety", self.safety)]
+        blocks += [("safety", self.safety), ("console", self.console)]
         blocks += [(f"planner.{name}", block) for name, block in self.formations.items()]
         for name, spec in self.subtasks.items():
             blocks += [(name, part) for part in (spec.kind, spec.impedance, spec.input)]
@@ -113,6 +117,8 @@ class Scenario:
             ScenarioError: Parts do not fit together.
         """
         self.safety.check()
+        if self.console:
+            self.console.check()
         if len(self.general.gravity) != 3:
             raise ScenarioError("gravity", list(self.general.gravity), "3 numbers")
         sources = [join_source(name, source) for name in self.subtasks for source in SOURCES]

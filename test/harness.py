@@ -169,7 +169,7 @@ class Ros:
         """Lets a node live here."""
         self._executor.add_node(node)
         self._nodes.append(node)
-        if isinstance(node, ScenarioNode) and not node.lockstep:
+        if isinstance(node, ScenarioNode) and node.has_loop:
             self._thread(self._loop, node)
         return node
 

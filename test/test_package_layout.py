@@ -14,11 +14,21 @@ ROS_MODULES = ("rclpy", "builtin_interfaces", "rcl_interfaces", "std_srvs", "ame
 
 # What each part must not import: whatever stands above it. "" are the modules beside the parts.
 ABOVE = {
-    "team": {"subtasks", "control", "simulation", "operator", "analysis", "nodes", "cli"},
-    "subtasks": {"control", "simulation", "operator", "analysis", "nodes", "cli"},
-    "control": {"simulation", "operator", "analysis", "nodes", "cli"},
-    "simulation": {"analysis", "nodes", "cli"},
-    "operator": {"analysis", "nodes", "cli"},
+    "team": {
+        "subtasks",
+        "control",
+        "simulation",
+        "operator",
+        "console",
+        "analysis",
+        "nodes",
+        "cli",
+    },
+    "subtasks": {"control", "simulation", "operator", "console", "analysis", "nodes", "cli"},
+    "control": {"simulation", "operator", "console", "analysis", "nodes", "cli"},
+    "simulation": {"console", "analysis", "nodes", "cli"},
+    "operator": {"console", "analysis", "nodes", "cli"},
+    "console": {"analysis", "nodes", "cli"},
     "analysis": {"nodes", "cli"},
     "nodes": {"cli"},
     "": {"analysis", "nodes", "cli"},

@@ -130,17 +130,22 @@ class ScenarioNode(Node):
         self._last_refusal = f"{topic}: {reason}"
         self.get_logger().warning(f"refused {topic}: {reason}", throttle_duration_sec=LOG_PERIOD)
 
+    @property
+    def has_loop(self) -> bool:
+        """Whether the main thread has a loop of its own; in lockstep callbacks do everything."""
+        return not self.lockstep
+
     def loop(self) -> None:
-        """What the main thread does in wall time; in lockstep callbacks do everything."""
+        """What the main thread does where it has a loop."""
 
     def run(self) -> None:
         """Runs until the context is shut down."""
         executor = EventsExecutor(context=self.context)
         executor.add_node(self)
-        if self.lockstep:
-            spin(executor, self.context)
-        else:
+        if self.has_loop:
             self._run_loop(executor)
+        else:
+            spin(executor, self.context)
 
     def _run_loop(self, executor: EventsExecutor) -> None:
         """The loop here and the callbacks beside it; where one of them fails, both end."""

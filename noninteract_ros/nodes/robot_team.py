@@ -19,6 +19,7 @@ from noninteract_ros.clock import seconds, tick_stamp
 from noninteract_ros.control.inputs import HORIZON
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes import messages
+from noninteract_ros.nodes.body_poses import BodyPoses
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.lockstep import StampOrder
 from noninteract_ros.nodes.messages import Level
@@ -56,6 +57,7 @@ class RobotTeam(ScenarioNode):
         self._end_tick = round(general.end_time * general.rate) if general.end_time else None
         self._publish_to = self.create_publisher(JointState, "joint_states", LOOP_QOS)
         self._describe()
+        self._bodies = BodyPoses(self, self._simulation)
         self._wrenches = [
             self.create_publisher(WrenchStamped, f"{name}/external_wrench", LOOP_QOS)
             for name in team.names
@@ -146,6 +148,7 @@ class RobotTeam(ScenarioNode):
                 self._wrenches, simulation.external_wrenches(), strict=True
             ):
                 publisher.publish(messages.to_wrench_stamped(self._stamp, wrench))
+            self._bodies.publish(self._stamp)
         positions = self._team.joints_from_configuration(simulation.q)
         self._publish_to.publish(
             self._states.encode(self._stamp, positions, simulation.v, simulation.torque)

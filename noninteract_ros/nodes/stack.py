@@ -146,7 +146,7 @@ class InProcess:
         self._thread("executor", spin, self._executor, self._recorder.context)
         self._thread("recorder", self._recorder.run, self._stopping.is_set)
         for node in self._nodes:
-            if not node.lockstep:
+            if node.has_loop:
                 self._thread(node.get_name(), node.loop)
 
     def _thread(self, name: str, target: Any, *arguments: Any) -> None:

@@ -65,6 +65,9 @@ class Plant:
         self._numbers = {frame.name: number for number, frame in enumerate(model.frames)}
         self._frames = [[self._frame(name) for name in item.frames] for item in self.couplings]
         self._tools = [f"{robot.name}/{robot.tool_frame}" for robot in team.robots]
+        first = team.model.njoints
+        names = [model.names[joint] for joint in range(first, model.njoints)]
+        self._bodies = {name.split("/")[0]: first + i for i, name in enumerate(names)}
 
     def _frame(self, name: str) -> int:
         return self._numbers[name]
@@ -72,6 +75,21 @@ class Plant:
     def integrate(self, q: Array, step: Array) -> Array:
         """Configuration reached from q along a tangent vector, shape (nv,)."""
         return pin.integrate(self.model, q, step)
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Names of the passive bodies."""
+        return tuple(self._bodies)
+
+    def body_poses(self, q: Array) -> dict[str, Array]:
+        """Pose of each passive body, by name: x, y, z, quaternion x, y, z, w, shape (7,).
+
+        A door's is that of its hinge.
+        """
+        pin.forwardKinematics(self.model, self._data, q)
+        return {
+            name: pin.SE3ToXYZQUAT(self._data.oMi[joint]) for name, joint in self._bodies.items()
+        }
 
     def chart_velocity(self, q_0: Array, q: Array, v: Array) -> Array:
         """Rate of the tangent vector from q_0 to q, shape (nv,); v itself on flat joints."""

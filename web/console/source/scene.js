@@ -1,0 +1,250 @@
+// SPDX-License-Identifier: Apache-2.0
+// The 3-D view: the team, its references as ghosts, what is around it.
+
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+
+import { colour } from "./palette.js";
+
+const UP = new THREE.Vector3(0, 0, 1);
+
+function material(robot, ghost) {
+  return new THREE.MeshLambertMaterial({
+    color: colour(robot),
+    ...(ghost && {
+      transparent: true,
+      opacity: 0.28,
+      depthWrite: false,
+      // Where ghost and robot are at the same place, the robot is seen.
+      polygonOffset: true,
+      polygonOffsetFactor: 2,
+      polygonOffsetUnits: 2,
+    }),
+  });
+}
+
+// Meshes: kind u4, then of each one numbers of vertices and corners u4, vertices f4, corners u4.
+function readMeshes(data) {
+  const view = new DataView(data);
+  const meshes = [];
+  for (let at = 4; at < data.byteLength; ) {
+    const [vertices, corners] = [view.getUint32(at, true), view.getUint32(at + 4, true)];
+    at += 8;
+    const geometry = new THREE.BufferGeometry();
+    const places = new Float32Array(data, at, 3 * vertices);
+    geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
+    at += 12 * vertices;
+    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(data, at, corners), 1));
+    at += 4 * corners;
+    const flat = geometry.toNonIndexed(); // Hulls look right with a normal for each face.
+    flat.computeVertexNormals();
+    meshes.push(flat);
+  }
+  return meshes;
+}
+
+function geometryOf({ kind, size }, meshes) {
+  if (kind === "mesh") return meshes.shift();
+  if (kind === "box") return new THREE.BoxGeometry(...size);
+  if (kind === "sphere") return new THREE.SphereGeometry(size[0], 20, 14);
+  const round =
+    kind === "capsule"
+      ? new THREE.CapsuleGeometry(size[0], size[1], 6, 14)
+      : new THREE.CylinderGeometry(size[0], size[0], size[1], 20);
+  return round.rotateX(Math.PI / 2); // Along z, as the robots' geometry has it.
+}
+
+function place(object, poses, at) {
+  object.visible = Number.isFinite(poses[at]);
+  if (!object.visible) return;
+  object.position.fromArray(poses, at);
+  object.quaternion.fromArray(poses, at + 3);
+}
+
+export class Scene {
+  constructor(parent) {
+    this.parent = parent;
+    this.renderer = new THREE.WebGLRenderer({ antialias: true });
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
+    parent.append(this.renderer.domElement);
+    this.scene = new THREE.Scene();
+    this.scene.background = new THREE.Color("#dfe6ee");
+    this.camera = new THREE.PerspectiveCamera(45, 1, 0.02, 200);
+    this.camera.up.copy(UP);
+    this.camera.position.set(0, -2, 2);
+    this.orbit = new OrbitControls(this.camera, this.renderer.domElement);
+    this.orbit.addEventListener("change", () => this.redraw());
+    this.scene.add(new THREE.HemisphereLight("#ffffff", "#8a8f98", 2.0));
+    const sun = new THREE.DirectionalLight("#ffffff", 1.7);
+    sun.position.set(1.5, -2, 3);
+    this.scene.add(sun);
+    const grid = new THREE.GridHelper(6, 24, "#8d98a5", "#bcc6d1");
+    grid.rotation.x = Math.PI / 2;
+    this.scene.add(grid, new THREE.AxesHelper(0.25));
+    this.stage = new THREE.Group();
+    this.scene.add(this.stage);
+    this.handles = new Map();
+    this.dirty = true;
+    this.drawn = 0;
+    new ResizeObserver(() => this.resize()).observe(parent);
+    this.resize();
+    const loop = () => {
+      requestAnimationFrame(loop);
+      if (!this.dirty) return;
+      this.dirty = false;
+      this.drawn += 1;
+      this.renderer.render(this.scene, this.camera);
+    };
+    loop();
+  }
+
+  redraw() {
+    this.dirty = true;
+  }
+
+  resize() {
+    const [width, height] = [this.parent.clientWidth, this.parent.clientHeight];
+    if (!width || !height) return;
+    this.renderer.setSize(width, height);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.redraw();
+  }
+
+  build(hello, data) {
+    this.stage.clear();
+    this.hello = hello;
+    this.framed = false;
+    const meshes = readMeshes(data);
+    const frames = () => Array.from({ length: hello.joints + 1 }, () => new THREE.Group());
+    [this.joints, this.ghosts] = [frames(), frames()];
+    this.ghost = new THREE.Group();
+    for (const shape of hello.shapes) {
+      const geometry = geometryOf(shape, meshes);
+      for (const [groups, isGhost] of [[this.joints, false], [this.ghosts, true]]) {
+        if (isGhost && shape.joint === 0) continue;
+        const mesh = new THREE.Mesh(geometry, material(shape.robot, isGhost));
+        place(mesh, shape.placement, 0);
+        groups[shape.joint].add(mesh);
+      }
+    }
+    this.ghost.add(...this.ghosts);
+    this.stage.add(...this.joints, this.ghost);
+    this.buildBodies(hello);
+    this.buildHandles(hello);
+    this.buildEdges(hello);
+    this.redraw();
+  }
+
+  buildBodies({ bodies, walls }) {
+    const solid = (opacity) =>
+      new THREE.MeshLambertMaterial({ color: "#b9925a", transparent: opacity < 1, opacity });
+    this.bodies = bodies.map((body) => {
+      const group = new THREE.Group();
+      if (body.kind === "box") {
+        group.add(new THREE.Mesh(new THREE.BoxGeometry(...body.size), solid(0.85)));
+      } else {
+        for (const end of body.handles) {
+          const tip = new THREE.Vector3(...end);
+          const bar = new THREE.CapsuleGeometry(0.012, tip.length(), 4, 8);
+          const mesh = new THREE.Mesh(bar, solid(1));
+          mesh.position.copy(tip).multiplyScalar(0.5);
+          mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), tip.normalize());
+          group.add(mesh);
+        }
+      }
+      return group;
+    });
+    this.stage.add(...this.bodies);
+    for (const { point, normal } of walls) {
+      const wall = new THREE.Mesh(
+        new THREE.PlaneGeometry(2, 1),
+        new THREE.MeshLambertMaterial({
+          color: "#8b94a0",
+          transparent: true,
+          opacity: 0.6,
+          side: THREE.DoubleSide,
+        }),
+      );
+      const facing = new THREE.Vector3(...normal).normalize();
+      const across = Math.abs(facing.z) > 0.9 ? new THREE.Vector3(0, 1, 0) : UP;
+      wall.up.copy(across);
+      wall.position.set(...point);
+      wall.lookAt(facing.add(wall.position));
+      this.stage.add(wall);
+    }
+  }
+
+  buildHandles({ subtasks }) {
+    this.handles.clear();
+    for (const { name, handles } of subtasks) {
+      for (const { element } of handles) this.handles.set(`${name}/${element}`, new THREE.Group());
+    }
+  }
+
+  buildEdges({ edges, robots }) {
+    this.tools = robots.map(() => new THREE.Group());
+    const places = new THREE.BufferAttribute(new Float32Array(6 * edges.length), 3);
+    const geometry = new THREE.BufferGeometry().setAttribute("position", places);
+    const look = new THREE.LineBasicMaterial({ color: "#5c6673" });
+    this.edges = new THREE.LineSegments(geometry, look);
+    this.edges.frustumCulled = false;
+    this.stage.add(this.edges);
+  }
+
+  // A picture: see console/frames.py.
+  take(data) {
+    const view = new DataView(data);
+    if (!this.hello || (data.byteLength - 16) / 28 !== view.getUint32(4, true)) return null;
+    const poses = new Float32Array(data, 16);
+    let at = 0;
+    const each = (objects) => {
+      for (const object of objects) {
+        place(object, poses, at);
+        at += 7;
+      }
+    };
+    each(this.joints.slice(1));
+    each(this.ghosts.slice(1));
+    each(this.bodies);
+    each(this.handles.values());
+    each(this.tools);
+    const line = this.edges.geometry.attributes.position;
+    this.hello.edges.flat().forEach((tool, corner) => {
+      line.setXYZ(corner, ...this.tools[tool].position.toArray());
+    });
+    line.needsUpdate = true;
+    if (!this.framed) this.frame();
+    this.redraw();
+    return view.getFloat64(8, true);
+  }
+
+  // Looks at the whole team from the front and above, so that +x is to the right.
+  frame() {
+    const box = new THREE.Box3();
+    this.stage.updateMatrixWorld(true);
+    for (const object of [...this.joints, ...this.tools, ...this.bodies]) {
+      if (object.visible) box.expandByObject(object);
+    }
+    if (box.isEmpty()) return;
+    const ball = box.getBoundingSphere(new THREE.Sphere());
+    const angle = Math.atan(Math.tan((this.camera.fov * Math.PI) / 360) * Math.min(1, this.camera.aspect));
+    const distance = (1.15 * Math.max(0.4, ball.radius)) / Math.sin(angle);
+    this.orbit.target.copy(ball.center);
+    this.camera.position.set(0, -0.75, 0.66).multiplyScalar(distance).add(ball.center);
+    this.orbit.update();
+    this.framed = true;
+  }
+
+  showGhosts(shown) {
+    if (this.ghost) this.ghost.visible = shown;
+    this.redraw();
+  }
+
+  // Where a point of the world is in the window [px].
+  inWindow(point) {
+    const seen = point.clone().project(this.camera);
+    const box = this.renderer.domElement.getBoundingClientRect();
+    return [box.x + ((seen.x + 1) / 2) * box.width, box.y + ((1 - seen.y) / 2) * box.height];
+  }
+}
