@@ -167,15 +167,21 @@ def repair(
 
 @app.command()
 def check(
-    target: Annotated[str, typer.Argument(help="Name or file of a scenario.")],
-    samples: Annotated[int, typer.Option(min=1, help="Number of random states.")] = 20,
+    target: Annotated[str, typer.Argument(help="Name or file of a scenario, or: identities.")],
+    others: Annotated[
+        list[str] | None, typer.Argument(help="Scenarios of a check like identities; or all.")
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option("--states", "--samples", min=1, help="Number of random states.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="JSON instead of tables.")] = False,
 ) -> int:
     """Check a scenario, and the law on its team, without running it."""
-    from noninteract_ros.analysis.check import CheckSettings, run_check
+    from noninteract_ros.analysis.check import run_check
+    from noninteract_ros.analysis.check_report import CheckSettings
 
-    found = run_check(target, CheckSettings(samples, seed))
+    found = run_check(target, CheckSettings(samples, seed), others or ())
     if as_json:
         print(json.dumps(found.as_dict(), indent=2))
         return 0 if found.passed else 1

@@ -95,6 +95,14 @@ def config_folders() -> list[Path]:
     return [source, *(share / PACKAGE / "config" for share in shares)]
 
 
+def known_scenarios() -> dict[str, Path]:
+    """Files of all scenarios that can be called by a name."""
+    known: dict[str, Path] = {}
+    for folder in reversed(config_folders()):
+        known.update({file.stem: file for file in sorted(folder.glob("*.yaml"))})
+    return known
+
+
 def find_scenario(name: str) -> Path:
     """The file of a scenario given by its path or by its name.
 
@@ -103,9 +111,7 @@ def find_scenario(name: str) -> Path:
     """
     if Path(name).is_file():
         return Path(name)
-    known: dict[str, Path] = {}
-    for folder in reversed(config_folders()):
-        known.update({file.stem: file for file in sorted(folder.glob("*.yaml"))})
+    known = known_scenarios()
     if name not in known:
         raise ScenarioError("scenario", repr(name), f"a file, or {one_of(sorted(known), name)}")
     return known[name]

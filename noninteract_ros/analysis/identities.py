@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the law claims of itself, measured at random states of a team."""
+"""What the law claims of itself, measured at random states of a team.
+
+Matrices over subtasks and joints mix units: an inertia has kg, kg m and kg m^2. So coordinates are
+scaled first such that every inertia, M as well as each M_i, has ones on its diagonal:
+A -> diag(M)^-1/2 A diag(M)^-1/2 for what maps velocities to forces, and likewise for the others.
+Then all entries of a matrix have one unit, none or 1/s, the choice of units drops out, and a
+residual is the largest entry of what ought to vanish by the largest one of its terms. A torque's
+residual is the largest over the joints, each relative to the sum of the sizes of what its torque
+is summed from.
+"""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -7,19 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from noninteract_ros.analysis.checks import Check, at_most
+from noninteract_ros.analysis.law_probe import LawProbe, Sample
 from noninteract_ros.arrays import Array
 from noninteract_ros.control import decoupling, plain_form
 from noninteract_ros.control.decoupling import TaskDynamics, TaskError
 from noninteract_ros.control.impedance import Impedance
-from noninteract_ros.subtasks.stack import SubtaskStack
-from noninteract_ros.team.team import Team, TeamState
-
-SPREAD = 0.2  # [m or rad] how far from the initial configuration the states are taken
-SPEED = 1.0  # [m/s or rad/s] bound of their velocities
-ERROR = 0.2  # [SI] bound of their errors, desired accelerations and forces
-STEP = 1e-5  # [s] of the central differences
-ROUNDING = 1e-8  # limit of what only rounding may keep from zero, relative
-DIFFERENCING = 1e-5  # limit of what central differences may keep from zero, relative
 
 PlainForm = Callable[[TaskDynamics, Array, TaskError, Impedance], Array]
 
@@ -46,113 +47,119 @@ PLAIN_FORMS: dict[str, PlainForm] = {
 
 
 @dataclass(frozen=True)
-class LawProbe:
-    """A team under the law, to be looked at in any state.
+class Identity:
+    """A kind of identity.
 
     Attributes:
-        team: The robots.
-        stack: Their subtasks.
-        impedance: Gains of all subtasks.
+        short: A word for it.
+        name: The identity.
+        limit: Relative residual that it may have.
     """
 
-    team: Team
-    stack: SubtaskStack
-    impedance: Impedance
+    short: str
+    name: str
+    limit: float
 
-    def dynamics(self, state: TeamState) -> TaskDynamics:
-        """Task dynamics at a state."""
-        task = self.stack.evaluate(state)
-        return decoupling.task_dynamics(state, task, self.stack.slices, self.impedance.inertias)
 
-    def along(self, state: TeamState, dt: float) -> TaskDynamics:
-        """Task dynamics `dt` seconds further along the velocity of a state."""
-        q = self.team.integrate(state.q, dt * state.v)
-        return self.dynamics(self.team.state(q, state.v))
+DECOUPLED = Identity("Gamma", "J M^-1 Gamma = blkdiag(M_i^-1)", 1e-10)
+TORQUES = Identity("torque", "both forms of the torque", 1e-9)
+SKEW = Identity("skew", "dM_i/dt - 2 C~_i is skew", 1e-9)
+CORIOLIS = Identity("dM/dt", "dM/dt = C + C'", 1e-9)
+JACOBIAN = Identity("dJ/dt", "dJ/dt", 1e-9)
+IDENTITIES = (DECOUPLED, TORQUES, SKEW, CORIOLIS, JACOBIAN)
 
-    def random_states(
-        self, count: int, seed: int
-    ) -> Iterator[tuple[TeamState, TaskDynamics, TaskError]]:
-        """States near the initial one, with errors and desired motions that fit them."""
-        rng = np.random.default_rng(seed)
-        n = self.team.n
-        for _ in range(count):
-            q = self.team.integrate(self.team.q0, rng.uniform(-SPREAD, SPREAD, n))
-            state = self.team.state(q, rng.uniform(-SPEED, SPEED, n))
-            dynamics = self.dynamics(state)
-            e, e_rate, acceleration, force = rng.uniform(-ERROR, ERROR, (4, n))
-            desired = dynamics.J @ state.v - e_rate
-            yield state, dynamics, TaskError(e, e_rate, desired, acceleration, force)
+Residual = tuple[Identity, str, float]
+"""An identity, the law or subtask that it was measured for, and how far it is from holding."""
+
+
+def largest_residuals(
+    probe: LawProbe, samples: int, seed: int
+) -> dict[tuple[Identity, str], float]:
+    """The largest residual of each identity, for each law or subtask, over random states."""
+    largest: dict[tuple[Identity, str], float] = {}
+    for sample in probe.samples(samples, seed):
+        for identity, which, value in residuals(probe, sample):
+            # NaN must stay and fail; a comparison would lose it.
+            before = largest.get((identity, which), 0.0)
+            largest[identity, which] = float(np.maximum(before, value))
+    return largest
 
 
 def identities(probe: LawProbe, samples: int, seed: int) -> list[Check]:
-    """The largest residual of each identity over random states, against its limit."""
-    exact: dict[str, float] = {}
-    differenced: dict[str, float] = {}
-    for state, dynamics, error in probe.random_states(samples, seed):
-        _keep_largest(exact, _exact(probe, state, dynamics, error))
-        _keep_largest(differenced, _differenced(probe, state, dynamics))
+    """The largest residuals of all identities, against their limits."""
+    return claims(largest_residuals(probe, samples, seed))
+
+
+def claims(largest: Mapping[tuple[Identity, str], float], prefix: str = "") -> list[Check]:
+    """Residuals against their limits; the prefix begins the names."""
     return [
-        *(at_most(name, value, ROUNDING, "relative") for name, value in exact.items()),
-        *(at_most(name, value, DIFFERENCING, "relative") for name, value in differenced.items()),
+        at_most(
+            prefix + ", ".join(filter(None, (item.name, which))), value, item.limit, "relative"
+        )
+        for (item, which), value in largest.items()
     ]
 
 
-def _keep_largest(largest: dict[str, float], found: Mapping[str, float]) -> None:
-    for name, value in found.items():
-        # NaN must stay and fail; a comparison would lose it.
-        largest[name] = float(np.maximum(largest.get(name, 0.0), value))
-
-
-def _exact(
-    probe: LawProbe, state: TeamState, dynamics: TaskDynamics, error: TaskError
-) -> dict[str, float]:
-    residuals = {"J M^-1 Gamma = blkdiag(M_i^-1)": decoupling_residual(dynamics)}
+def residuals(probe: LawProbe, sample: Sample) -> Iterator[Residual]:
+    """All residuals at a state."""
+    state, dynamics = sample.state, sample.dynamics
+    yield DECOUPLED, "", decoupling_residual(dynamics)
     for law in PLAIN_FORMS:
-        value = torque_residual(probe, state, dynamics, error, law)
-        residuals[f"both forms of the torque, {law}"] = value
-    return residuals
-
-
-def _differenced(probe: LawProbe, state: TeamState, dynamics: TaskDynamics) -> dict[str, float]:
-    before, after = probe.along(state, -STEP), probe.along(state, STEP)
-    M_rate, J_rate = _rate(before.M, after.M), _rate(before.J, after.J)
-    residuals = {
-        "dM/dt = C + C'": _relative(M_rate - state.C - state.C.T, state.C, state.M),
-        "dJ/dt": _relative(J_rate - dynamics.J_rate, dynamics.J_rate, dynamics.J),
-    }
+        yield TORQUES, law, torque_residual(probe, sample, law)
     kept = plain_form.subtask_coriolis(dynamics)
     for i, name in enumerate(probe.stack.names):
-        rate = _rate(before.inertias[i], after.inertias[i])
-        residuals[f"dM_i/dt - 2 C~_i is skew, {name}"] = _relative(
-            rate - kept[i] - kept[i].T, kept[i], dynamics.inertias[i]
-        )
-    return residuals
+        size = _sizes(dynamics.inertias[i])
+        rate = _scaled(sample.rate(_inertia_of(i)), size)
+        own = _scaled(kept[i], size)
+        yield SKEW, name, _relative(rate - own - own.T, own)
+    joints, tasks = _sizes(dynamics.M), _task_sizes(dynamics)
+    M_rate, C = _scaled(sample.rate(lambda at: at.M), joints), _scaled(state.C, joints)
+    yield CORIOLIS, "", _relative(M_rate - C - C.T, C)
+    J_rate = _scaled(sample.rate(lambda at: at.J), 1.0 / tasks, joints)
+    yield JACOBIAN, "", _relative(J_rate - _scaled(dynamics.J_rate, 1.0 / tasks, joints), J_rate)
 
 
 def decoupling_residual(dynamics: TaskDynamics) -> float:
-    """How far J M^-1 Gamma is from blkdiag(M_i^-1), relative: Theorem 1, (16)."""
+    """How far J M^-1 Gamma is from blkdiag(M_i^-1): Theorem 1, (16)."""
     inverses = tuple(np.linalg.inv(inertia) for inertia in dynamics.inertias)
     wanted = plain_form.block_diagonal(dynamics, inverses)
     found = dynamics.J @ np.linalg.solve(dynamics.M, plain_form.decoupling_matrix(dynamics))
-    return _relative(found - wanted, wanted)
+    sizes = 1.0 / _task_sizes(dynamics)
+    wanted = _scaled(wanted, sizes)
+    return float(np.abs(_scaled(found, sizes) - wanted).max() / np.abs(wanted).max())
 
 
-def torque_residual(
-    probe: LawProbe, state: TeamState, dynamics: TaskDynamics, error: TaskError, law: str
-) -> float:
-    """Difference of alpha + Gamma tau~_c and inverse dynamics of the same law, relative."""
-    plain = PLAIN_FORMS[law](dynamics, state.v, error, probe.impedance)
-    task_acceleration = decoupling.commanded_acceleration(law, dynamics, error, probe.impedance)
+def torque_residual(probe: LawProbe, sample: Sample, law: str) -> float:
+    """Difference of alpha + Gamma tau~_c and inverse dynamics of the same law."""
+    state, dynamics, error = sample.state, sample.dynamics, sample.error
+    gains = probe.impedance
+    plain = PLAIN_FORMS[law](dynamics, state.v, error, gains)
+    task_acceleration = decoupling.commanded_acceleration(law, dynamics, error, gains)
     wanted = dynamics.joint_acceleration(state.v, task_acceleration)
     fast = probe.team.inverse_dynamics(state.q, state.v, wanted)
-    return _relative(fast - plain, plain)
+    inputs = dynamics.J.T if law == "natural" else plain_form.decoupling_matrix(dynamics)
+    pull = np.abs(gains.damping * error.e_rate) + np.abs(gains.force(error.e))
+    summed = np.abs(inputs) @ (pull + np.abs(error.force))
+    summed += np.abs(dynamics.M) @ np.abs(wanted) + np.abs(dynamics.C) @ np.abs(state.v)
+    return float((np.abs(fast - plain) / (summed + np.abs(dynamics.g))).max())
 
 
-def _rate(before: Array, after: Array) -> Array:
-    return (after - before) / (2.0 * STEP)
+def _inertia_of(subtask: int) -> Callable[[TaskDynamics], Array]:
+    return lambda dynamics: dynamics.inertias[subtask]
 
 
-def _relative(residual: Array, *scales: Array) -> float:
-    """Largest element of a residual by the largest one of what it is made of."""
-    scale = sum(np.abs(array).max() for array in scales)
-    return float(np.abs(residual).max() / scale)
+def _sizes(inertia: Array) -> Array:
+    return np.sqrt(np.diag(inertia))
+
+
+def _task_sizes(dynamics: TaskDynamics) -> Array:
+    return np.concatenate([_sizes(inertia) for inertia in dynamics.inertias])
+
+
+def _scaled(matrix: Array, rows: Array, columns: Array | None = None) -> Array:
+    return matrix / np.outer(rows, rows if columns is None else columns)
+
+
+def _relative(residual: Array, term: Array) -> float:
+    """Largest entry by that of a term [1/s], and by 1/s where the term is less."""
+    return float(np.abs(residual).max() / (1.0 + np.abs(term).max()))

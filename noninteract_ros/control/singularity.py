@@ -20,16 +20,21 @@ def regularity(S: Array) -> float:
     return 1.0 / norm if np.isfinite(norm) and norm > 0.0 else 0.0
 
 
+def joint_range(team: Team) -> tuple[Array, Array]:
+    """Lowest and highest joint positions, (n,) each; without a limit, `REACH` from the start."""
+    start = team.joints_from_configuration(team.q0)
+    lower, upper = team.position_limits
+    lower = np.where(np.isfinite(lower), lower, start - REACH)
+    return lower, np.where(np.isfinite(upper), upper, start + REACH)
+
+
 def best_regularity(team: Team, stack: SubtaskStack) -> float:
     """Largest regularity at the initial and at random configurations within joint limits.
 
     The initial one alone would not do as a measure: it may be anything, a singular one too.
     """
     rng = np.random.default_rng(0)
-    start = team.joints_from_configuration(team.q0)
-    lower, upper = team.position_limits
-    lower = np.where(np.isfinite(lower), lower, start - REACH)
-    upper = np.where(np.isfinite(upper), upper, start + REACH)
+    lower, upper = joint_range(team)
     still = np.zeros(team.n)
     best = regularity(inverse(stack.evaluate(team.state(team.q0, still)).J))
     for _ in range(SAMPLES):

@@ -13,8 +13,10 @@ from repository import ROOT
 
 from noninteract_ros import cli
 from noninteract_ros.analysis import check
-from noninteract_ros.analysis.check import CheckReport, CheckSettings, run_check
-from noninteract_ros.analysis.identities import LawProbe, identities
+from noninteract_ros.analysis.check import run_check
+from noninteract_ros.analysis.check_report import CheckReport, CheckSettings
+from noninteract_ros.analysis.identities import identities
+from noninteract_ros.analysis.law_probe import LawProbe
 from noninteract_ros.analysis.loops import linearised
 from noninteract_ros.control import decoupling, plain_form
 from noninteract_ros.control.impedance import Impedance
