@@ -134,16 +134,19 @@ def _run(file: Path, folder: Path, in_process: bool) -> bool:
 def report(
     run: Annotated[Path, typer.Argument(help="A run: its folder or its run.mcap.")],
     out: Annotated[Path | None, typer.Option(help="Output folder; by default the run's.")] = None,
+    compare_laws: Annotated[
+        bool, typer.Option(help="Also the same motion under each law and at other rates.")
+    ] = False,
 ) -> int:
     """Make metrics and figures again from a recording alone."""
-    return _report(run, out)
+    return _report(run, out, compare_laws)
 
 
-def _report(run: Path, out: Path | None) -> int:
+def _report(run: Path, out: Path | None, compare_laws: bool = False) -> int:
     from noninteract_ros.analysis.report import tables, write_report
 
     with console.status("computing metrics, drawing figures"):
-        made = write_report(run, out)
+        made = write_report(run, out, compare=compare_laws)
     for table in tables(made):
         console.print(table)
     console.print("Files:", *(f"\n  {file}" for file in made.files))

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rehearsals of a recorded scenario, to compare the recording with; several at a time."""
 
-import multiprocessing
-import os
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from noninteract_ros.analysis.processes import in_processes
 from noninteract_ros.arrays import Array
 from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario import Scenario
@@ -62,11 +60,5 @@ def rehearse_variant(scenario: Scenario, variant: Variant, ticks: int) -> Joints
 
 def rehearse_all(scenario: Scenario, jobs: Sequence[tuple[Variant, int]]) -> list[Joints]:
     """Rehearses variants for so many ticks each; long ones in processes of their own."""
-    workers = min(len(jobs), os.cpu_count() or 1)
-    if workers < 2 or sum(ticks for _, ticks in jobs) < SMALL:
-        return [rehearse_variant(scenario, *job) for job in jobs]
-    # A fresh interpreter each: a fork would inherit the threads of whoever asks.
-    fresh = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=fresh) as pool:
-        running = [pool.submit(rehearse_variant, scenario, *job) for job in jobs]
-        return [item.result() for item in running]
+    work = [(scenario, *job) for job in jobs]
+    return in_processes(rehearse_variant, work, sum(ticks for _, ticks in jobs) >= SMALL)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from noninteract_ros.analysis.checks import Check
+from noninteract_ros.analysis.compliance import compare_laws, laws_metrics
 from noninteract_ros.analysis.figures import draw
 from noninteract_ros.analysis.metrics import measure
 from noninteract_ros.analysis.recorded import Recorded
@@ -47,7 +48,13 @@ class Report:
         return tuple(check for check in self.checks if check.passed is False)
 
 
-def write_report(run_path: Path, out: Path | None = None, *, other_laws: bool = True) -> Report:
+def write_report(
+    run_path: Path,
+    out: Path | None = None,
+    *,
+    other_laws: bool = True,
+    compare: bool = False,
+) -> Report:
     """Measures a run and draws its figures.
 
     Long runs are rehearsed in processes of their own: a program that calls this must be
@@ -57,6 +64,8 @@ def write_report(run_path: Path, out: Path | None = None, *, other_laws: bool = 
         run_path: Recording, or the folder that holds it as `run.mcap`.
         out: Folder for `metrics.json` and the figures; by default the recording's own.
         other_laws: Whether the scenario is rehearsed under other laws, to compare.
+        compare: Whether it is also rehearsed as a whole under each law, under plain compliance
+            control and at other rates; for arms that takes minutes.
 
     Raises:
         RecordingError: The recording cannot be read or analysed, or the folder not be written.
@@ -66,6 +75,8 @@ def write_report(run_path: Path, out: Path | None = None, *, other_laws: bool = 
     folder = out or run.path.parent
     findings = measure(recorded, other_laws)
     checks = tuple(findings.checks)
+    if compare:
+        findings.metrics["laws"] = _laws(recorded)
     report = Report(findings.metrics, checks, ())
     metrics = _finite(
         findings.metrics
@@ -79,6 +90,12 @@ def write_report(run_path: Path, out: Path | None = None, *, other_laws: bool = 
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be written: {error.strerror}") from error
     return Report(metrics, checks, (path, *figures), tuple(missing))
+
+
+def _laws(recorded: Recorded) -> dict[str, Any]:
+    """Errors of the scenario, as it was run, under each law and at several rates."""
+    duration = float(recorded.t[-1] - recorded.t[0])
+    return laws_metrics(compare_laws(recorded.scenario, duration), duration)
 
 
 def _finite(value: Any) -> Any:

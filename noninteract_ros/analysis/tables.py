@@ -17,6 +17,7 @@ def tables(report: "Report") -> list[Table]:
         checks_table(report.checks),
         tracking_table(report.metrics),
         *crossing_tables(report.metrics),
+        *([laws_table(report.metrics["laws"])] if "laws" in report.metrics else []),
     ]
 
 
@@ -60,6 +61,29 @@ def crossing_tables(metrics: dict[str, Any]) -> list[Table]:
             own = " (its own)" if subtask == owned else ""
             table.add_row(source, subtask + own, *(_number(value) for value in moved))
     return [table]
+
+
+def laws_table(laws: dict[str, Any]) -> Table:
+    """Largest errors under each law, and at each rate."""
+    subtasks = list(laws["order_of_fall"])
+    table = Table(
+        "largest error under", r"rate \[Hz]", *(rf"{name} \[m, rad]" for name in subtasks), "D/M"
+    )
+    for row in laws["rows"]:
+        errors = (row["max_error_m"], row["max_error_rad"])
+        cells = (", ".join(_number(error[name]) for error in errors) for name in subtasks)
+        law = row["law"] + (" (limits acted)" if row["limits_acted"] else "")
+        table.add_row(law, f"{row['rate_Hz']:g}", *cells, _number(row["damping_per_tick"]))
+    orders = ", ".join(
+        f"{name} {'-' if order is None else format(order, '.2f')}"
+        for name, order in laws["order_of_fall"].items()
+    )
+    table.caption = (
+        f"at up to {_number(laws['speed_m_per_s'])} m/s and {_number(laws['turning_rad_per_s'])}"
+        f" rad/s for {laws['duration_s']:g} s; order in the tick: {orders}\n"
+        "D/M: largest eigenvalue of inertia^-1 D in a tick; held over it, a loop is stable below 2"
+    )
+    return table
 
 
 def _number(value: float | None) -> str:
