@@ -32,6 +32,7 @@ class General:
     rate: float = key("Ticks per second [Hz]", 1000.0, positive=True, maximum=10000.0)
     duration: float = key("How long a demo runs [s]", 20.0, positive=True)
     lockstep: bool = key("Step only when the command that answers a state has come", True)
+    real_time: bool = key("In lockstep: never run ahead of wall time", False)
     law: str = key("Control law", "noninteracting", choices=LAWS, live=True)
     gravity: tuple[float, ...] = key("Gravity in the world [m/s^2]", (0.0, 0.0, -9.81))
     telemetry_rate: float = key(

@@ -28,8 +28,8 @@ ABOVE = {
     "control": {"simulation", "operator", "console", "analysis", "nodes", "cli"},
     "simulation": {"console", "analysis", "nodes", "cli"},
     "operator": {"console", "analysis", "nodes", "cli"},
-    "console": {"analysis", "nodes", "cli"},
-    "analysis": {"nodes", "cli"},
+    "console": {"nodes", "cli"},
+    "analysis": {"console", "nodes", "cli"},
     "nodes": {"cli"},
     "": {"analysis", "nodes", "cli"},
 }

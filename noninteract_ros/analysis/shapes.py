@@ -46,13 +46,16 @@ class Shape:
     owner: int
 
 
-def shapes_of(scenario: Scenario, plant: Plant, radius: float) -> list[Shape]:
+def shapes_of(
+    scenario: Scenario, plant: Plant, radius: float, longest: float | None = None
+) -> list[Shape]:
     """Shapes of all robots and of the bodies around them.
 
     Args:
         scenario: The scenario.
         plant: Its team and bodies.
-        radius: Of all that is seen [m]; point masses and triangles are small against it.
+        radius: Of all that is seen [m]; point masses are small against it.
+        longest: Longest edge of a triangle [m]; by default small against the radius.
     """
     found: list[Shape] = []
     for number, (robot, block) in enumerate(
@@ -68,7 +71,8 @@ def shapes_of(scenario: Scenario, plant: Plant, radius: float) -> list[Shape]:
         for name, block in scenario.surroundings.items()
         for joint, hull in _body(name, block, plant)
     ]
-    return [Shape(shape.joint, shape.hull.refined(FINE * radius), shape.owner) for shape in found]
+    edge = FINE * radius if longest is None else longest
+    return [Shape(shape.joint, shape.hull.refined(edge), shape.owner) for shape in found]
 
 
 def _in_plant(plant: Plant, robot: Robot, joint: int, hull: Hull) -> tuple[int, Hull]:

@@ -12,8 +12,8 @@ from noninteract_ros.console.drive import NO_TURN
 from noninteract_ros.console.frames import meshes
 from noninteract_ros.console.handles import WORLD, Handles, rotation_of
 from noninteract_ros.console.protocol import VERSION
-from noninteract_ros.console.shapes import mesh_bytes, team_shapes
-from noninteract_ros.console.surroundings import bodies, edges, walls
+from noninteract_ros.console.shapes import described, mesh_bytes, team_shapes
+from noninteract_ros.console.surroundings import edges, walls
 from noninteract_ros.console.view import TeamView
 from noninteract_ros.control.decoupling import LAWS
 from noninteract_ros.scenario import Scenario
@@ -28,21 +28,19 @@ class Stage:
         scenario: The scenario.
         team: Its team; not shared with other threads.
         stack: Its subtasks.
+
+    Attributes:
+        body_names: Names of the bodies whose poses are drawn.
     """
 
     def __init__(self, scenario: Scenario, team: Team, stack: SubtaskStack) -> None:
         self._scenario, self._team, self._stack = scenario, team, stack
         self._view = TeamView(team, stack)
         self._handles = {task.name: Handles.of(task, scenario, team) for task in stack.subtasks}
-        self._bodies = bodies(scenario, team)
-        shapes = team_shapes(team, scenario.robots)
-        self._meshes = meshes(mesh_bytes(shapes))
-        self._shapes = [shape.described() for shape in shapes]
-
-    @property
-    def body_names(self) -> list[str]:
-        """Names of the bodies whose poses are drawn."""
-        return [body["name"] for body in self._bodies]
+        plant = scenario.build_simulation(team, stack).plant
+        shapes = team_shapes(scenario, plant)
+        self._meshes, self._shapes = meshes(mesh_bytes(shapes)), described(shapes)
+        self.body_names = plant.body_names
 
     def greeting(self, told: Mapping[str, Any]) -> list[str | bytes]:
         """Description of all that is drawn, with what else is told, and the meshes."""
@@ -52,7 +50,7 @@ class Stage:
             "robots": list(self._team.names),
             "joints": self._team.model.njoints - 1,
             "shapes": self._shapes,
-            "bodies": self._bodies,
+            "bodies": len(self.body_names),
             "walls": walls(self._scenario),
             "edges": edges(self._scenario, self._team),
             "laws": list(LAWS),

@@ -31,11 +31,10 @@ class Status:
 
     Args:
         stack: The subtasks.
-        lockstep: Whether the scenario runs in lockstep.
     """
 
-    def __init__(self, stack: SubtaskStack, lockstep: bool) -> None:
-        self._names, self._lockstep = stack.names, lockstep
+    def __init__(self, stack: SubtaskStack) -> None:
+        self._names = stack.names
         self._heard: dict[str, Heard] = {}
         self._expected: dict[str, tuple[bool, float]] = {}
 

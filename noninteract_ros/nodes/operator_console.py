@@ -32,7 +32,7 @@ from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 
 TOKEN_VARIABLE = "NONINTERACT_CONSOLE_TOKEN"
-LONGEST_STEP = 0.05  # [s] of a reference, after the program was kept waiting
+LONGEST_STEP = 0.05  # [s] of a reference, after a gap in the team's states
 SAMPLE_PERIOD = 0.05  # [s] of plots
 STATUS_PERIOD = 0.2  # [s]
 READ_PERIOD = 1.0  # [s] of parameters
@@ -52,7 +52,11 @@ class OperatorConsole(ScenarioNode):
         team = self.scenario.build_team()
         stack = self.scenario.build_stack(team)
         self._stage = Stage(self.scenario, team, stack)
-        self._drivables = drivables(self.scenario, stack, self.settings)
+        # Lockstep waits for its sources; a person is none of those that can be waited for.
+        awaited = self.scenario.general.lockstep_sources if self.lockstep else ()
+        self._awaited = [name for name in stack.names if f"{name}/human" in awaited]
+        found = drivables(self.scenario, stack, self.settings)
+        self._drivables = {name: found[name] for name in found if name not in self._awaited}
         # A node without an executor: what it hears is taken by hand, when it is wanted.
         self._listener = Node(
             "operator_console_ear", namespace=self.get_namespace(), context=self.context
@@ -63,9 +67,9 @@ class OperatorConsole(ScenarioNode):
         self._switch = DeadMan(self.settings.hold_timeout)
         self._seat = Seat(self._switch)
         self._drive = Drive(self._drivables)
-        self._status = Status(stack, self.lockstep)
+        self._status = Status(stack)
         self._state_at = -1e9
-        self._last_step = time.monotonic()
+        self._led_at = -1  # Stamp of the state up to which references have been made [ns].
         self._told_at = self._sampled_at = 0.0
         self._sent = 0
         self._references = {
@@ -99,9 +103,8 @@ class OperatorConsole(ScenarioNode):
     def greeting(self) -> list[str | bytes]:
         """What a page is told first; called in the server's thread."""
         told = {
-            "lockstep": self.lockstep,
-            "hold_timeout": self.settings.hold_timeout,
             "drivable": list(self._drivables),
+            "awaited": self._awaited,
             "namespace": self.get_namespace(),
         }
         return self._stage.greeting(told)
@@ -162,14 +165,16 @@ class OperatorConsole(ScenarioNode):
 
     def _lead(self) -> None:
         """Says what the held handle, pad or key asks for, or brings the motion to rest."""
-        now = time.monotonic()
-        step, self._last_step = min(now - self._last_step, LONGEST_STEP), now
-        held = self._switch.held(now)
+        held = self._switch.held(time.monotonic())
         if held is None and not self._drive.active:
+            self._led_at = -1
             return
         self._listen()
+        # In the team's own time: it may be slower than that of the page.
+        passed = seconds(self._ear.stamp - self._led_at) if self._led_at >= 0 else 0.0
+        step, self._led_at = min(max(0.0, passed), LONGEST_STEP), self._ear.stamp
         scene = Scene(self._ear.desired, self._stage.frames(self._ear.state), self._led())
-        stamp = self.get_clock().now().nanoseconds
+        stamp = self._ear.stamp if self.lockstep else self.get_clock().now().nanoseconds
         for name, reference in self._drive.step(held, scene, step).items():
             codec, publisher = self._references[name]
             publisher.publish(
@@ -180,7 +185,7 @@ class OperatorConsole(ScenarioNode):
     def _led(self) -> frozenset[str]:
         """Subtasks that the human leads, while the team is there and not stopped."""
         age = time.monotonic() - self._state_at
-        if self.lockstep or age > STALE or self._status.stopped:
+        if age > STALE or self._status.stopped:
             return frozenset()
         parameters = self._calls.parameters
         return frozenset(

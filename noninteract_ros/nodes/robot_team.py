@@ -33,8 +33,8 @@ class RobotTeam(ScenarioNode):
     """Integrates (2) under the torques that answer its states.
 
     Lockstep: a state is stamped with simulated time, and the team steps when the command with
-    that stamp has come. Wall time: it steps at its rate, holds the last command for
-    `command_timeout` and then brakes.
+    that stamp has come; with `real_time` not before its time has come too. Wall time: it steps at
+    its rate, holds the last command for `command_timeout` and then brakes.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -47,6 +47,8 @@ class RobotTeam(ScenarioNode):
         self._commands = JointStateCodec(team.joint_names, required=("effort",))
         self._telemetry = max(1, round(general.rate / general.telemetry_rate))
         self._lock = threading.Lock()
+        self._paced = self.lockstep and general.real_time
+        self._can_step = threading.Event()
         self._paused = general.start_paused
         self._stamp = self._stamp_before = 0
         self._order = StampOrder()
@@ -92,7 +94,7 @@ class RobotTeam(ScenarioNode):
             self._check_command(stamp)
             self._command, self._command_at = (stamp, effort), time.monotonic()
             if self.lockstep and not self._paused:
-                self._advance(effort)
+                self._step_on(effort)
 
     def _check_command(self, stamp: int) -> None:
         """Refuses a command for a state that was not sent, or for one that is past."""
@@ -118,6 +120,13 @@ class RobotTeam(ScenarioNode):
             raise InputError(f"stamp {seconds(stamp):.6f} s {text}")
         else:
             self._order.take(robot, stamp)
+
+    def _step_on(self, torque: np.ndarray) -> None:
+        """Lockstep: steps under the command that has come, or has the loop do it in time."""
+        if self._paced:
+            self._can_step.set()
+        else:
+            self._advance(torque)
 
     def _advance(self, torque: np.ndarray | None) -> None:
         """One tick, then the state that follows."""
@@ -162,9 +171,17 @@ class RobotTeam(ScenarioNode):
             if waiting and not idle and self._command is None:
                 self._publish()
 
+    @property
+    def has_loop(self) -> bool:
+        """In wall time, and in lockstep that keeps to it."""
+        return not self.lockstep or self._paced
+
     def loop(self) -> None:
         """Steps at the rate of the scenario in wall time."""
         ticker = Ticker(self._simulation.rate)
+        if self._paced:
+            self._loop_paced(ticker)
+            return
         timeout = self.scenario.general.command_timeout
         while self.context.ok():
             ticker.wait()
@@ -174,6 +191,16 @@ class RobotTeam(ScenarioNode):
                 self._braking = command is None
                 if not self._paused:
                     self._advance(command[1] if command else None)
+
+    def _loop_paced(self, ticker: Ticker) -> None:
+        """Steps when the command has come and the period has begun, whichever is later."""
+        while self.context.ok():
+            ticker.wait()
+            self._can_step.wait(RESEND_PERIOD)
+            with self._lock:
+                self._can_step.clear()
+                if self._command is not None and not self._paused:
+                    self._advance(self._command[1])
 
     def _guarded(self, action: Callable[[], tuple[bool, str]]) -> Callable[[Any, Any], Any]:
         def serve(_: Any, response: Any) -> Any:
@@ -188,7 +215,7 @@ class RobotTeam(ScenarioNode):
             self._paused = request.data
             if self.lockstep and not self._paused:
                 if self._command is not None:
-                    self._advance(self._command[1])
+                    self._step_on(self._command[1])
                 else:
                     self._publish()
             response.success = True

@@ -90,14 +90,16 @@ function chosen() {
 function obstacle() {
   const { status, hello } = state;
   if (!status) return "not connected";
-  if (hello.lockstep) {
-    return "lockstep: time waits for messages here, not for people; set lockstep to false to drive";
-  }
   if (status.stopped) return "stopped: everything you do has no effect until somebody resumes";
   if (!drives()) return status.driver === null ? "take control to drive" : "somebody else drives";
   if (!status.there) return status.paused ? "paused" : "the team is not there";
   const { name, handle } = chosen();
-  if (!handle) return "nothing here can be driven";
+  if (!handle) {
+    const awaited = hello.awaited.join(", ");
+    return awaited
+      ? `the scenario waits for another source of ${awaited}: see its key lockstep_sources`
+      : "nothing here can be driven";
+  }
   const { authority } = status.subtasks[name];
   if (authority !== "human") return `${name} is led by ${authority}: hand it over to human first`;
   return "";

@@ -6,11 +6,12 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 
 import { colour } from "./palette.js";
 
+const BODY = "#b9925a";
 const UP = new THREE.Vector3(0, 0, 1);
 
 function material(robot, ghost) {
   return new THREE.MeshLambertMaterial({
-    color: colour(robot),
+    color: robot < 0 ? BODY : colour(robot),
     ...(ghost && {
       transparent: true,
       opacity: 0.28,
@@ -23,35 +24,22 @@ function material(robot, ghost) {
   });
 }
 
-// Meshes: kind u4, then of each one numbers of vertices and corners u4, vertices f4, corners u4.
+// Meshes: kind u4, then of each one the number of corners u4, corners f4, normals i1; see
+// console/shapes.py.
 function readMeshes(data) {
   const view = new DataView(data);
   const meshes = [];
   for (let at = 4; at < data.byteLength; ) {
-    const [vertices, corners] = [view.getUint32(at, true), view.getUint32(at + 4, true)];
-    at += 8;
+    const count = 3 * view.getUint32(at, true);
     const geometry = new THREE.BufferGeometry();
-    const places = new Float32Array(data, at, 3 * vertices);
-    geometry.setAttribute("position", new THREE.BufferAttribute(places, 3));
-    at += 12 * vertices;
-    geometry.setIndex(new THREE.BufferAttribute(new Uint32Array(data, at, corners), 1));
-    at += 4 * corners;
-    const flat = geometry.toNonIndexed(); // Hulls look right with a normal for each face.
-    flat.computeVertexNormals();
-    meshes.push(flat);
+    const corners = new Float32Array(data, at + 4, count);
+    const normals = new Int8Array(data, at + 4 + 4 * count, count);
+    geometry.setAttribute("position", new THREE.BufferAttribute(corners, 3));
+    geometry.setAttribute("normal", new THREE.BufferAttribute(normals, 3, true));
+    meshes.push(geometry);
+    at += 4 + 4 * count + 4 * Math.ceil(count / 4);
   }
   return meshes;
-}
-
-function geometryOf({ kind, size }, meshes) {
-  if (kind === "mesh") return meshes.shift();
-  if (kind === "box") return new THREE.BoxGeometry(...size);
-  if (kind === "sphere") return new THREE.SphereGeometry(size[0], 20, 14);
-  const round =
-    kind === "capsule"
-      ? new THREE.CapsuleGeometry(size[0], size[1], 6, 14)
-      : new THREE.CylinderGeometry(size[0], size[0], size[1], 20);
-  return round.rotateX(Math.PI / 2); // Along z, as the robots' geometry has it.
 }
 
 function place(object, poses, at) {
@@ -116,46 +104,27 @@ export class Scene {
     this.hello = hello;
     this.framed = false;
     const meshes = readMeshes(data);
-    const frames = () => Array.from({ length: hello.joints + 1 }, () => new THREE.Group());
-    [this.joints, this.ghosts] = [frames(), frames()];
+    const groups = (count) => Array.from({ length: count }, () => new THREE.Group());
+    const world = new THREE.Group();
+    [this.joints, this.ghosts] = [groups(hello.joints), groups(hello.joints)];
+    this.bodies = groups(hello.bodies);
     this.ghost = new THREE.Group();
-    for (const shape of hello.shapes) {
-      const geometry = geometryOf(shape, meshes);
-      for (const [groups, isGhost] of [[this.joints, false], [this.ghosts, true]]) {
-        if (isGhost && shape.joint === 0) continue;
-        const mesh = new THREE.Mesh(geometry, material(shape.robot, isGhost));
-        place(mesh, shape.placement, 0);
-        groups[shape.joint].add(mesh);
-      }
+    const places = [world, ...this.joints, ...this.bodies];
+    for (const { joint, robot } of hello.shapes) {
+      const geometry = meshes.shift();
+      places[joint].add(new THREE.Mesh(geometry, material(robot, false)));
+      const shadow = this.ghosts[joint - 1];
+      if (shadow) shadow.add(new THREE.Mesh(geometry, material(robot, true)));
     }
-    this.ghost.add(...this.ghosts);
-    this.stage.add(...this.joints, this.ghost);
-    this.buildBodies(hello);
+    if (hello.joints) this.ghost.add(...this.ghosts);
+    this.stage.add(...places, this.ghost);
+    this.buildWalls(hello);
     this.buildHandles(hello);
     this.buildEdges(hello);
     this.redraw();
   }
 
-  buildBodies({ bodies, walls }) {
-    const solid = (opacity) =>
-      new THREE.MeshLambertMaterial({ color: "#b9925a", transparent: opacity < 1, opacity });
-    this.bodies = bodies.map((body) => {
-      const group = new THREE.Group();
-      if (body.kind === "box") {
-        group.add(new THREE.Mesh(new THREE.BoxGeometry(...body.size), solid(0.85)));
-      } else {
-        for (const end of body.handles) {
-          const tip = new THREE.Vector3(...end);
-          const bar = new THREE.CapsuleGeometry(0.012, tip.length(), 4, 8);
-          const mesh = new THREE.Mesh(bar, solid(1));
-          mesh.position.copy(tip).multiplyScalar(0.5);
-          mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), tip.normalize());
-          group.add(mesh);
-        }
-      }
-      return group;
-    });
-    this.stage.add(...this.bodies);
+  buildWalls({ walls }) {
     for (const { point, normal } of walls) {
       const wall = new THREE.Mesh(
         new THREE.PlaneGeometry(2, 1),
@@ -204,8 +173,8 @@ export class Scene {
         at += 7;
       }
     };
-    each(this.joints.slice(1));
-    each(this.ghosts.slice(1));
+    each(this.joints);
+    each(this.ghosts);
     each(this.bodies);
     each(this.handles.values());
     each(this.tools);
