@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The dead-man's switch, the driver's seat, and how much a page may send."""
+
+import numpy as np
+
+from noninteract_ros.console.held import DeadMan, Push
+from noninteract_ros.console.limits import Allowance
+from noninteract_ros.console.seat import Seat
+
+HELD = Push("cooperative", 0, np.ones(3), np.zeros(3))
+
+
+def test_silence_lets_go() -> None:
+    """What is not said again within the timeout is let go, and stays so."""
+    switch = DeadMan(0.2)
+    switch.hold(HELD, 1.0)
+    assert switch.held(1.2) is HELD
+    assert switch.held(1.201) is None
+    assert switch.held(1.1) is None
+
+
+def test_only_the_driver_holds() -> None:
+    """What other pages hold has no effect, and neither has their letting go."""
+    switch = DeadMan(0.2)
+    seat = Seat(switch)
+    assert not seat.hold(1, HELD, 0.0)
+    assert switch.held(0.0) is None
+    seat.take(1, 0.0)
+    assert seat.hold(1, HELD, 0.0)
+    seat.release(2)
+    assert switch.held(0.0) is HELD
+    seat.release(1)
+    assert switch.held(0.0) is None
+
+
+def test_whoever_loses_the_seat_lets_go() -> None:
+    """Taking over, leaving and being closed all release what was held."""
+    switch = DeadMan(0.2)
+    seat = Seat(switch)
+    seat.take(1, 0.0)
+    seat.hold(1, HELD, 0.0)
+    assert seat.take(2, 0.0) == 1
+    assert switch.held(0.0) is None
+    assert not seat.hold(1, HELD, 0.0)
+    seat.hold(2, HELD, 0.0)
+    seat.leave(1)
+    assert switch.held(0.0) is HELD
+    seat.leave(2)
+    assert switch.held(0.0) is None
+    assert seat.driver is None
+
+
+def test_a_silent_driver_is_noticed() -> None:
+    """Silence counts from the driver's last word; others' words do not count."""
+    seat = Seat(DeadMan(0.2))
+    assert seat.silence(100.0) == 0.0
+    seat.take(1, 0.0)
+    seat.heard(1, 3.0)
+    seat.heard(2, 9.0)
+    assert seat.silence(10.0) == 7.0
+
+
+def test_an_allowance_bounds_rate_and_burst() -> None:
+    """In the long run so many a second, at once no more than that."""
+    allowance = Allowance(50.0)
+    assert sum(allowance.take(0.0) for _ in range(200)) == 50
+    granted = sum(allowance.take(0.01 * k) for k in range(1, 1001))
+    assert granted in (499, 500)
