@@ -9,6 +9,7 @@ import numpy as np
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.energy import Energy
 from noninteract_ros.control.tick import Tick
+from noninteract_ros.operator.bilateral import BilateralLink
 from noninteract_ros.operator.narrator import Narrator
 from noninteract_ros.scenario import Scenario
 
@@ -47,6 +48,9 @@ class Rehearsal:
         scenario: What to run.
         human: Whether the haptic device speaks, if the scenario has one.
         autonomy: Whether the planner speaks, if the scenario has one.
+
+    Attributes:
+        link: The link between the operator's device and the team, if the scenario has one.
     """
 
     def __init__(self, scenario: Scenario, human: bool = True, autonomy: bool = True) -> None:
@@ -55,10 +59,12 @@ class Rehearsal:
         self.controller = scenario.build_controller(self.team, self.stack)
         self.simulation = scenario.build_simulation(self.team, self.stack)
         self._felt: str | None = None
+        self.link: BilateralLink | None = None
         self._speakers: list[tuple[str, str, Narrator]] = []
         rate = scenario.general.rate
         if human and scenario.haptic:
             device = scenario.build_haptic(self.stack)
+            self.link = device if isinstance(device, BilateralLink) else None
             self._speakers.append((scenario.haptic.subtask, "human", Narrator(device, rate)))
             self._felt = scenario.haptic.subtask if scenario.haptic.hand_mass > 0.0 else None
         if autonomy and scenario.planner:

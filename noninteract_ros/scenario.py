@@ -10,7 +10,9 @@ from noninteract_ros.control.inputs import SOURCES
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_of
+from noninteract_ros.operator.bilateral import BilateralLink
 from noninteract_ros.operator.haptic import HapticDevice, HapticSettings
+from noninteract_ros.operator.link_settings import LinkSettings
 from noninteract_ros.operator.planner import Formation, FormationPlanner, PlannerSettings
 from noninteract_ros.scenario_blocks import (
     OPTIONAL,
@@ -47,6 +49,7 @@ class Scenario:
         subtasks: Subtasks, by name.
         held: Object that the team holds, or None.
         haptic: The operator's emulated hand and device, or None.
+        link: The connection between device and team, or None.
         planner: The relative planner, or None.
         formations: The planner's formations, by name.
         pushes: Scheduled pushes, by name.
@@ -60,6 +63,7 @@ class Scenario:
     subtasks: Mapping[str, SubtaskSpec]
     held: ObjectSettings | None
     haptic: HapticSettings | None
+    link: LinkSettings | None
     planner: PlannerSettings | None
     formations: Mapping[str, Formation]
     pushes: Mapping[str, ScheduledPush]
@@ -84,6 +88,7 @@ class Scenario:
             {name: load_subtask(name, block_of(values, name)) for name in general.subtasks},
             load_optional(ObjectSettings, values, "object"),
             load_optional(HapticSettings, values, "haptic"),
+            load_optional(LinkSettings, values, "link"),
             planner,
             formations,
             {name: load(ScheduledPush, block_of(values, name), name) for name in general.pushes},
@@ -101,8 +106,8 @@ class Scenario:
         """Dotted key, type, rule and value of every key of every block."""
         blocks: list[tuple[str, object | None]] = [("", self.general)]
         blocks += [*self.robots.items(), *self.pushes.items(), *self.surroundings.items()]
-        blocks += [("object", self.held), ("haptic", self.haptic), ("planner", self.planner)]
-        blocks += [("safety", self.safety), ("console", self.console)]
+        blocks += [("object", self.held), ("haptic", self.haptic), ("link", self.link)]
+        blocks += [("planner", self.planner), ("safety", self.safety), ("console", self.console)]
         blocks += [(f"planner.{name}", block) for name, block in self.formations.items()]
         for name, spec in self.subtasks.items():
             blocks += [(name, part) for part in (spec.kind, spec.impedance, spec.input)]
@@ -134,7 +139,7 @@ class Scenario:
         for push_name, push in self.pushes.items():
             push.check(push_name, team)
         self.build_simulation(team, stack)
-        if self.haptic:
+        if self.haptic or self.link:
             self.build_haptic(stack)
         if self.planner:
             self.build_planner(stack)
@@ -181,10 +186,12 @@ class Scenario:
         plant = Plant(team, bodies, [coupling for _, couplings in parts for coupling in couplings])
         return TeamSimulation(plant, self.general.rate, held, list(self.pushes.values()))
 
-    def build_haptic(self, stack: SubtaskStack) -> HapticDevice:
-        """The operator's emulated hand and device."""
+    def build_haptic(self, stack: SubtaskStack) -> HapticDevice | BilateralLink:
+        """The operator's emulated hand and device, behind its link if there is one."""
         settings = self._required(self.haptic, "haptic")
-        return HapticDevice(settings, self._commanded(stack, settings.subtask, "haptic").layout)
+        layout = self._commanded(stack, settings.subtask, "haptic").layout
+        device = HapticDevice(settings, layout)
+        return BilateralLink(device, settings, self.link, layout) if self.link else device
 
     def build_planner(self, stack: SubtaskStack) -> FormationPlanner:
         """The relative planner."""

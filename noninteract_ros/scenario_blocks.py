@@ -16,7 +16,7 @@ from noninteract_ros.simulation.environment import SURROUNDINGS, SurroundingBloc
 from noninteract_ros.subtasks.registry import SubtaskBlock, kind_named
 from noninteract_ros.team.registry import ROBOT_MODELS, RobotBlock
 
-OPTIONAL = ("object", "haptic", "planner", "safety", "console")
+OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console")
 LISTINGS = ("robots", "subtasks", "pushes", "surroundings")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # What may be a part of a topic's name.
 # Every ROS node has these of its own.

@@ -9,6 +9,7 @@ import numpy as np
 
 from noninteract_ros.analysis.check_report import CheckReport, CheckSettings, Section
 from noninteract_ros.analysis.checks import at_least, at_most
+from noninteract_ros.analysis.delay import delay_check
 from noninteract_ros.analysis.identities import identities
 from noninteract_ros.analysis.identity_check import check_identities
 from noninteract_ros.analysis.law_probe import LawProbe
@@ -23,7 +24,10 @@ MARGINAL = 1e-9  # growth beyond 1 that rounding may cause where a mode neither 
 
 
 # Checks with names of their own; they choose or are given scenarios.
-BUILT_IN: dict[str, Callable[[CheckSettings], CheckReport]] = {"identities": check_identities}
+BUILT_IN: dict[str, Callable[[CheckSettings], CheckReport]] = {
+    "identities": check_identities,
+    "delay": delay_check,
+}
 
 
 def run_check(target: str, settings: CheckSettings, others: Sequence[str] = ()) -> CheckReport:

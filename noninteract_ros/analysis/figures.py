@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from noninteract_ros.analysis.arm_figures import limits_figure
 from noninteract_ros.analysis.energy_account import Account, account
+from noninteract_ros.analysis.link_figures import link_account, link_figure
 from noninteract_ros.analysis.paths import paths_figure
 from noninteract_ros.analysis.recorded import Recorded, Tracking, select
 from noninteract_ros.analysis.rendering import Film, motion_figure, save_animation
@@ -46,6 +47,8 @@ def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
     except RecordingError as error:
         missing.append(str(error))
     files.append(save(paths_figure(recorded), folder / "paths.png"))
+    if link := link_account(recorded):
+        files.append(save(link_figure(recorded, link), folder / "link.png"))
     if not recorded.constant:
         files.append(save(limits_figure(recorded), folder / "limits.png"))
     try:

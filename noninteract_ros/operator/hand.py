@@ -56,6 +56,11 @@ class Hand:
             intended.acceleration + deviation.acceleration,
         )
 
+    @property
+    def offset(self) -> tuple[Array, Array]:
+        """Deviation of the plain coordinates and its rate, shape (dim,) each [m; m/s]."""
+        return self._state[0], self._state[1]
+
     def deviation(self, force: Array) -> Reference:
         """How the device moves away from the intended motion under a force [N], shape (dim,)."""
         error, error_rate = self._state
@@ -99,6 +104,11 @@ class TurningHand:
             self._layout.merged(place.acceleration, turn.acceleration),
         )
         return intended.plus(gap, self._layout)
+
+    @property
+    def offset(self) -> tuple[Array, Array]:
+        """Deviation of the plain coordinates and its rate [m; m/s]."""
+        return self._place.offset
 
     def _torque(self, force: Array) -> Array:
         torque = force[self._layout.angular]

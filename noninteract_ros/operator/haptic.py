@@ -11,7 +11,9 @@ from noninteract_ros.control.reference import Reference
 from noninteract_ros.errors import InputError, ScenarioError
 from noninteract_ros.operator.hand import Hand, TurningHand
 from noninteract_ros.operator.haptic_settings import HapticSettings
+from noninteract_ros.operator.held_device import HeldDevice
 from noninteract_ros.operator.intended_motion import intended_motion
+from noninteract_ros.operator.port import shortened
 from noninteract_ros.operator.schedule import Schedule
 from noninteract_ros.schema import join
 from noninteract_ros.subtasks.layout import Layout
@@ -35,10 +37,11 @@ class HapticDevice:
         Raises:
             ScenarioError: A key does not fit the others, the subtask or the file it names.
         """
-        self._dim = layout.dim
+        self._layout, self._settings = layout, settings
         self._schedule = Schedule(settings.update_rate, _windows(settings, path))
         self._motion = intended_motion(settings, layout, path)
         self._hand = _hand(settings, layout) if settings.hand_mass > 0.0 else None
+        self._held = HeldDevice.of(settings, layout, path)
         self._sampled: int | None = None
 
     def sample(self, t: float, feedback: Array | None = None) -> Reference | None:
@@ -58,7 +61,7 @@ class HapticDevice:
         Raises:
             InputError: The feedback has another shape or is not finite.
         """
-        force = self._checked(feedback)
+        force = self.limited(self.checked(feedback))
         index = self._schedule.index(t)
         if self._schedule.window(index) is None:
             return None
@@ -66,7 +69,14 @@ class HapticDevice:
         if self._hand is None:
             return intended
         self._move(self._hand, index, force)
+        if self._held:
+            force = self._held.force(force, intended, self._hand)
         return self._hand.deflect(intended, force)
+
+    def limited(self, force: Array) -> Array:
+        """What the device can do of a force [N; N m], shape (dim,)."""
+        force = shortened(force, self._layout.rates, self._settings.force_limit)
+        return shortened(force, self._layout.angular.ravel(), self._settings.torque_limit)
 
     def next_update(self, t: float) -> float:
         """The first update instant later than `t` [s], spoken or not."""
@@ -77,19 +87,29 @@ class HapticDevice:
         return self._schedule.silent_until(t)
 
     def _move(self, hand: Hand | TurningHand, index: int, force: Array) -> None:
-        if self._sampled is None or index < self._sampled:
+        before, self._sampled = self._sampled, index
+        if before is None or index < before:
             hand.reset()
-        elif index > self._sampled:
-            cut_off = self._schedule.window(self._sampled) != self._schedule.window(index)
+            if self._held:
+                self._held.reset()
+        elif index > before:
+            cut_off = self._schedule.window(before) != self._schedule.window(index)
             felt = np.zeros_like(force) if cut_off else force
-            hand.advance(felt, index - self._sampled)
-        self._sampled = index
+            if not self._held:
+                hand.advance(felt, index - before)
+                return
+            for past in range(before, index):
+                self._held.notice(hand)
+                intended = self._motion(past / self._schedule.rate)
+                hand.advance(self._held.force(felt, intended, hand), 1)
 
-    def _checked(self, feedback: Array | None) -> Array:
+    def checked(self, feedback: Array | None) -> Array:
+        """A feedback as it may act [N; N m], zeros for none; raises InputError as `sample`."""
         if feedback is None:
-            return np.zeros(self._dim)
-        if feedback.shape != (self._dim,):
-            raise InputError(f"feedback has shape {feedback.shape}, should be ({self._dim},)")
+            return np.zeros(self._layout.dim)
+        if feedback.shape != (self._layout.dim,):
+            shape = f"({self._layout.dim},)"
+            raise InputError(f"feedback has shape {feedback.shape}, should be {shape}")
         if not np.isfinite(feedback).all():
             raise InputError(f"feedback is not finite: {feedback.tolist()}")
         return feedback
@@ -110,8 +130,9 @@ def _windows(settings: HapticSettings, path: str) -> list[tuple[float, float]]:
 
 def _hand(settings: HapticSettings, layout: Layout) -> Hand | TurningHand:
     period = 1.0 / settings.update_rate
-    grip = settings.hand_mass, settings.hand_damping, settings.hand_stiffness
-    place = Hand(*grip, period, layout.rates.size)
+    mass = settings.hand_mass + settings.device_mass
+    damping = settings.hand_damping + settings.device_damping
+    place = Hand(mass, damping, settings.hand_stiffness, period, layout.rates.size)
     if not layout.rotates:
         return place
     grip = settings.hand_inertia, settings.hand_turning_damping, settings.hand_turning_stiffness

@@ -66,6 +66,21 @@ class HapticSettings:
     hand_turning_stiffness: float = key(
         "Stiffness of the grip against turning [N m/rad]", 3.0, minimum=0.0
     )
+    device_mass: float = key(
+        "Mass of the device, which the hand has to move along [kg]", 0.0, minimum=0.0
+    )
+    device_damping: float = key("Damping of the device [N s/m]", 0.0, minimum=0.0)
+    force_limit: float = key("Most force of the device [N]; 0: any", 0.0, minimum=0.0)
+    torque_limit: float = key("Most torque of the device [N m]; 0: any", 0.0, minimum=0.0)
+    workspace: tuple[float, ...] = key(
+        "Edges of the device's workspace, a box [m]; by default it has no end", (), positive=True
+    )
+    workspace_centre: tuple[float, ...] = key("Its centre [m]; by default the origin", ())
+    workspace_stiffness: float = key("Stiffness of its ends [N/m]", 2000.0, positive=True)
+    reaction_stiffness: float = key(
+        "How the operator makes good a deviation on noticing it [N/m]", 0.0, minimum=0.0
+    )
+    reaction_delay: float = key("How late the operator notices [s]", 0.2, minimum=0.0)
     dropout_times: tuple[float, ...] = key(
         "Start, end, start, end, ... of the dropouts of the connection [s]", (), minimum=0.0
     )

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The figure of a link's energy account."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rehearsed import record, scenario_values
+
+from noninteract_ros.analysis.figures import draw
+from noninteract_ros.analysis.link_figures import link_account, link_figure, operator_net
+from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.recording import RunWriter
+from noninteract_ros.nodes.messages import EnergyCodec
+from noninteract_ros.operator.bilateral import LinkAccount
+
+KIND = "std_msgs/msg/Float64MultiArray"
+
+
+def recorded(folder: Path, budget: float) -> Recorded:
+    """A run with a link and ten accounts."""
+    values = scenario_values(haptic__hand_mass=0.5)
+    values["link"] = {"delay": 0.1, "reserve": 0.25}
+    codec = EnergyCodec(("time", *LinkAccount._fields))
+
+    def accounts(writer: RunWriter) -> None:
+        for n in range(10):
+            account = np.array([0.1 * n, 2.0 * n, 0.5 * n, 1.5 * n, 0.1 * n, 0.3, budget, 4.0])
+            stamp = 10**8 * n
+            writer.add("/team/cooperative/link", KIND, stamp, stamp, codec.encode(account))
+
+    return Recorded(record(folder, values, 0.2, extra=accounts))
+
+
+@pytest.mark.parametrize("budget", [0.7, np.inf])
+def test_the_figure_shows_ports_balance_and_budgets(tmp_path: Path, budget: float) -> None:
+    """Curves are what was published; the bound is the reserve; no budget is drawn without end."""
+    run = recorded(tmp_path, budget)
+    account = link_account(run)
+    assert account is not None
+    np.testing.assert_allclose(operator_net(account), 1.5 * np.arange(10))
+    figure = link_figure(run, account)
+    ports, balance, budgets = figure.axes
+    curves = {str(line.get_label()): line.get_ydata() for line in ports.lines}
+    np.testing.assert_allclose(curves["hand: in"], 2.0 * np.arange(10))
+    np.testing.assert_allclose(curves["team: out"], 0.1 * np.arange(10))
+    bound = {str(line.get_label()): line.get_ydata() for line in balance.lines}["bound"]
+    np.testing.assert_allclose(bound, -0.25)
+    assert np.isfinite(budgets.lines[1].get_ydata()).all() == np.isfinite(budget)
+
+
+def test_it_is_drawn_where_there_is_a_link_and_only_there(tmp_path: Path) -> None:
+    """`link.png` is among the files of such a run."""
+    for name, run in (
+        ("with", recorded(tmp_path, 0.5)),
+        ("without", Recorded(record(tmp_path, scenario_values(), 0.2))),
+    ):
+        folder = tmp_path / name
+        folder.mkdir()
+        files, _ = draw(run, folder)
+        assert ("link.png" in {file.name for file in files}) == (name == "with")
