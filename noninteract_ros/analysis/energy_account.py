@@ -135,7 +135,7 @@ def _holding_work(recorded: Recorded, subtask: str, found: Account, holding: Hol
     force = np.zeros_like(found.velocity_error)
     rows, others = common_instants(found.t, holding.t)
     force[rows] = holding.force[others][:, recorded.part(subtask)]
-    return _integral(found.t, (found.velocity_error * force).sum(axis=1))
+    return integral(found.t, (found.velocity_error * force).sum(axis=1))
 
 
 def _crossing(recorded: Recorded) -> str:
@@ -165,7 +165,7 @@ def _growth(recorded: Recorded, subtask: str, found: Account) -> tuple[float | N
     if not quiet.any():
         return None, "no time with a still reference and without external force"
     largest = 0.0
-    for first, last in _runs(quiet):
+    for first, last in pieces(quiet):
         storage = found.storage[first : last + 1]
         lowest = np.minimum.accumulate(storage)
         largest = max(largest, float((storage - lowest).max()))
@@ -190,19 +190,19 @@ def _against_supply(
     if reason := _late(recorded) or _rubbing(recorded):
         return 0.0, 0.0, reason
     excess = mismatch = 0.0
-    told = ~_jumps(recorded.task(subtask).layout, found.desired)
+    told = ~jumps(recorded.task(subtask).layout, found.desired)
     told &= _felt(recorded, found.t) & found.in_force
-    for first, last in _runs(told):
+    for first, last in pieces(told):
         piece = slice(first, last + 1)
         gain = found.storage[piece] - found.storage[first]
-        unsupplied = gain - _integral(found.t[piece], found.supplied[piece])
+        unsupplied = gain - integral(found.t[piece], found.supplied[piece])
         excess = max(excess, float((unsupplied - np.minimum.accumulate(unsupplied)).max()))
-        rest = gain - _integral(found.t[piece], found.rate[piece]) - (work[piece] - work[first])
+        rest = gain - integral(found.t[piece], found.rate[piece]) - (work[piece] - work[first])
         mismatch = max(mismatch, float(np.abs(rest).max()))
     return excess, mismatch, ""
 
 
-def _integral(t: Array, power: Array) -> Array:
+def integral(t: Array, power: Array) -> Array:
     """Energy since the first instant by the trapezoidal rule, shape (n,) [J]."""
     return np.concatenate(([0.0], np.cumsum(np.diff(t) * (power[1:] + power[:-1]) / 2)))
 
@@ -214,7 +214,7 @@ def _still(desired: Motion) -> NDArray[np.bool_]:
     return np.asarray(rest[1:] & rest[:-1] & same)
 
 
-def _jumps(layout: Layout, desired: Motion) -> NDArray[np.bool_]:
+def jumps(layout: Layout, desired: Motion) -> NDArray[np.bool_]:
     """Whether the reference jumps between each instant and the next, shape (n - 1,)."""
     h = np.diff(desired.t)[:, None]
     x, v, a = desired.position, desired.velocity, desired.acceleration
@@ -250,7 +250,7 @@ def _untouched(recorded: Recorded, t: Array) -> NDArray[np.bool_]:
     return np.asarray(free[1:] & free[:-1]) & _felt(recorded, t)
 
 
-def _runs(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def pieces(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last instant of each piece in which every step holds."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], holds, [False])).astype(int)))
     return [(first, last) for first, last in pairwise(edges.tolist()) if holds[first]]

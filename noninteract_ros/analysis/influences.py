@@ -65,10 +65,11 @@ def _unforeseen(
     found = []
     if len(recorded.run.log_times(topic)) > len(series.stamps) + len(series.markers):
         found.append(Influence(subtask, f"more than one reference for an instant on {topic}"))
-    if not len(series.stamps):
-        return found
+    if not len(series.stamps) or not recorded.lockstep:
+        return found  # In wall time a source counts from when it was started.
     foreseen, following = set(), -0.5 / recorded.rate
-    while (following := sampler.silent_until(following)) <= seconds(stamp(series.stamps.max())):
+    last = seconds(stamp(series.stamps.max()))
+    while (following := sampler.silent_until(following)) <= last:
         foreseen.add(stamp(following))
     stamps = np.round(series.stamps * 1e9).astype(np.int64).tolist()
     if not foreseen.issuperset(stamps):

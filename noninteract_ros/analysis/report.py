@@ -10,9 +10,10 @@ from typing import Any
 from noninteract_ros.analysis.checks import Check
 from noninteract_ros.analysis.compliance import compare_laws, laws_metrics
 from noninteract_ros.analysis.figures import draw
-from noninteract_ros.analysis.metrics import measure
+from noninteract_ros.analysis.metrics import Findings, measure
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.run import Run
+from noninteract_ros.analysis.storage_order import storage_orders
 from noninteract_ros.analysis.tables import tables
 from noninteract_ros.errors import RecordingError
 
@@ -74,9 +75,9 @@ def write_report(
     recorded = Recorded(run)
     folder = out or run.path.parent
     findings = measure(recorded, other_laws)
-    checks = tuple(findings.checks)
     if compare:
-        findings.metrics["laws"] = _laws(recorded)
+        _compare(recorded, findings)
+    checks = tuple(findings.checks)
     report = Report(findings.metrics, checks, ())
     metrics = _finite(
         findings.metrics
@@ -92,10 +93,12 @@ def write_report(
     return Report(metrics, checks, (path, *figures), tuple(missing))
 
 
-def _laws(recorded: Recorded) -> dict[str, Any]:
-    """Errors of the scenario, as it was run, under each law and at several rates."""
-    duration = float(recorded.t[-1] - recorded.t[0])
-    return laws_metrics(compare_laws(recorded.scenario, duration), duration)
+def _compare(recorded: Recorded, findings: Findings) -> None:
+    """Adds the scenario, as it was run, under each law and at several rates."""
+    scenario, duration = recorded.scenario, float(recorded.t[-1] - recorded.t[0])
+    findings.metrics["laws"] = laws_metrics(compare_laws(scenario, duration), duration)
+    findings.metrics["storage_order"], checks = storage_orders(scenario, duration)
+    findings.checks.extend(checks)
 
 
 def _finite(value: Any) -> Any:

@@ -18,6 +18,7 @@ def tables(report: "Report") -> list[Table]:
         tracking_table(report.metrics),
         *crossing_tables(report.metrics),
         *([laws_table(report.metrics["laws"])] if "laws" in report.metrics else []),
+        *storage_tables(report.metrics.get("storage_order", {})),
     ]
 
 
@@ -84,6 +85,23 @@ def laws_table(laws: dict[str, Any]) -> Table:
         "D/M: largest eigenvalue of inertia^-1 D in a tick; held over it, a loop is stable below 2"
     )
     return table
+
+
+def storage_tables(found: dict[str, Any]) -> list[Table]:
+    """What the balance of each storage function misses at each rate; none if nobody looked."""
+    rows = [(name, item) for name, item in found.items() if isinstance(item, dict)]
+    if not rows:
+        return []
+    rates = (f"{rate:g} Hz" for rate in rows[0][1]["rate_Hz"])
+    table = Table("storage less supply", "", *(rf"{rate} \[J]" for rate in rates), "order")
+    for name, item in rows:
+        for label, key, order in (
+            ("all of it", "missed_J", "order"),
+            ("less holding the torque", "unexplained_J", "order_unexplained"),
+        ):
+            numbers = (*item[key], item[order])
+            table.add_row(name, label, *(_number(value) for value in numbers))
+    return [table]
 
 
 def _number(value: float | None) -> str:

@@ -117,6 +117,19 @@ def test_where_it_says_nothing_it_says_why(tmp_path: Path) -> None:
         assert check.value is None
 
 
+def test_in_wall_time_a_source_speaks_when_it_likes(tmp_path: Path) -> None:
+    """Its stamps count from 1970: which instants are foreseen is not even asked."""
+    codec = SubtaskCodec("relative", ("robot_1-robot_2",), ("x", "y"))
+
+    def late(writer) -> None:
+        kind = "trajectory_msgs/msg/MultiDOFJointTrajectory"
+        data = reference(codec, 1.79e9, np.ones(2))
+        writer.add("/team/relative/autonomy/reference", kind, 0, 0, data)
+
+    recorded = Recorded(record(tmp_path, scenario_values(lockstep=False), 0.1, extra=late))
+    assert influences(recorded) == []
+
+
 def test_the_quintic_has_the_values_of_its_instants() -> None:
     """Position, velocity and acceleration fit at instants, a quintic fits everywhere."""
     t = np.array([0.0, 0.3, 0.35, 1.0])
