@@ -27,7 +27,7 @@ from noninteract_ros.scenario_blocks import (
     load_surrounding,
     named_blocks,
 )
-from noninteract_ros.schema import Key, describe, load
+from noninteract_ros.schema import Key, describe, join, load
 from noninteract_ros.simulation.environment import SurroundingBlock
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.push import ScheduledPush
@@ -133,6 +133,7 @@ class Scenario:
         for robot in self.general.force_sensors:
             if robot not in self.robots:
                 raise ScenarioError("force_sensors", repr(robot), one_of(self.robots, robot))
+        self._check_topics()
         team = self.build_team()
         stack = self.build_stack(team)
         self.build_controller(team, stack)
@@ -143,6 +144,17 @@ class Scenario:
             self.build_haptic(stack)
         if self.planner:
             self.build_planner(stack)
+
+    @property
+    def own_states(self) -> bool:
+        """Whether each robot tells its state on a topic of its own."""
+        return any(block.wiring.joint_states_topic for block in self.robots.values())
+
+    def _check_topics(self) -> None:
+        for name, block in self.robots.items():
+            if self.own_states and not block.wiring.joint_states_topic:
+                path, found = join(name, "joint_states_topic"), "nothing"
+                raise ScenarioError(path, found, "a topic for every robot, or for none")
 
     def build_team(self) -> Team:
         """The robots as one model."""

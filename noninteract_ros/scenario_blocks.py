@@ -14,6 +14,7 @@ from noninteract_ros.operator.planner import Formation, PlannerSettings
 from noninteract_ros.schema import Key, convert, join, key, keys_of, load
 from noninteract_ros.simulation.environment import SURROUNDINGS, SurroundingBlock
 from noninteract_ros.subtasks.registry import SubtaskBlock, kind_named
+from noninteract_ros.team.assembler import PREDICTIONS
 from noninteract_ros.team.registry import ROBOT_MODELS, RobotBlock
 
 OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console")
@@ -49,6 +50,17 @@ class General:
     )
     state_timeout: float = key(
         "Gap between states after which the controller starts anew [s]", 0.2, positive=True
+    )
+    max_state_skew: float = key(
+        "Age up to which a robot's state is carried on to that of the newest, where robots have"
+        " topics of their own; beyond it the team is held still [s]",
+        0.02,
+        positive=True,
+    )
+    state_prediction: str = key(
+        "What is taken as constant meanwhile; acceleration is measured, and noise with it",
+        "velocity",
+        choices=PREDICTIONS,
     )
     command_timeout: float = key(
         "Age of a command after which the team brakes, in wall time [s]", 0.1, positive=True

@@ -193,6 +193,9 @@ class Run:
         if name in self._topics:
             return self._topics[name]
         fitting = [full for full in self._topics if full.endswith(f"/{name.lstrip('/')}")]
+        # The team's own topics lie above those of its robots.
+        highest = min((full.count("/") for full in fitting), default=0)
+        fitting = [full for full in fitting if full.count("/") == highest]
         if len(fitting) == 1 and not name.startswith("/"):
             return self._topics[fitting[0]]
         trouble = "fits several topics" if len(fitting) > 1 else "is not in the recording"

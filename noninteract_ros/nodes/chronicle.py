@@ -25,6 +25,7 @@ class Chronicle:
 
     Attributes:
         cycle_times: How long the last answers took [s].
+        problem: Why the team is held still, or an empty text.
     """
 
     def __init__(self, node: ScenarioNode, core: TeamController, telemetry: Telemetry) -> None:
@@ -34,6 +35,7 @@ class Chronicle:
         self._silent: dict[str, bool] = {}
         self._conditions: list[str] = []
         self.cycle_times: deque[float] = deque(maxlen=1000)
+        self.problem = ""
 
     def note(self, now: float, tick: Tick) -> None:
         """Logs what changed: a new start, a source that went silent or came back, limits."""
@@ -61,14 +63,18 @@ class Chronicle:
         Args:
             now: The team's time [s].
             age: Age of its newest state in wall time [s]; None before the first one.
-            waiting: What the tick has been waiting for so long that it is worth a word.
+            waiting: What the tick has been waiting for so long that it is worth a word; before
+                the first state, robots that have not spoken.
             absent: Lockstep sources that were given up.
         """
         values = self._values(now, float("inf") if age is None else age)
         if age is None:
-            return Level.WARN, "waiting for the first state of the team", values
+            whom = ", ".join(waiting) or "the team"
+            return Level.WARN, f"waiting for the first state of {whom}", values
         if age > self._age_limit:
             return Level.ERROR, "holding: no states of the team", values
+        if self.problem:
+            return Level.ERROR, f"holding: {self.problem}", values
         if self._core.mode.stopped:
             return Level.WARN, "stopped", values
         if waiting:

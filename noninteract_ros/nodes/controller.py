@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
-from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
@@ -20,13 +19,13 @@ from noninteract_ros.control.inputs import HORIZON, SOURCES, Force, Motion, Rate
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.chronicle import Chronicle
 from noninteract_ros.nodes.controller_parameters import LiveParameters
 from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder, state_lead
 from noninteract_ros.nodes.messages import Level, Marker, ParsedReference, SubtaskCodec
-from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
+from noninteract_ros.nodes.node import ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
+from noninteract_ros.nodes.team_link import TeamLink
 from noninteract_ros.nodes.telemetry import Telemetry
 
 WATCH_PERIOD = 0.1  # [s] how often absent lockstep sources are looked for
@@ -48,16 +47,14 @@ class Controller(ScenarioNode):
         team = self.scenario.build_team()
         stack = self.scenario.build_stack(team)
         self.core: TeamController = self.scenario.build_controller(team, stack)
-        self._joints = JointStateCodec(team.joint_names, required=("position", "velocity"))
-        self._commands = JointStateCodec(team.joint_names)
         self._queue: deque[Callable[[], None]] = deque()
         self._state: tuple[int, Array, Array] | None = None
         self._state_at = self._waiting_since = -np.inf
         self._order, self._lead = StampOrder(), state_lead(general.rate)
         self._missing: list[str] = []
-        self._answered: tuple[int, bytes] | None = None
+        self._answered: int | None = None
+        self._stop_asked = False
         self._now = 0.0
-        self._command_to = self.create_publisher(JointState, "joint_commands", LOOP_QOS)
         self._telemetry = Telemetry(self, team, stack)
         self._chronicle = Chronicle(self, self.core, self._telemetry)
         self._live = LiveParameters(self, self.core, self._post)
@@ -66,17 +63,13 @@ class Controller(ScenarioNode):
             self.core.inputs,
             general.lockstep_timeout,
         )
-        self.subscribe(JointState, "joint_states", self._on_state, raw=True)
+        self._link = TeamLink(self, team, self._take_state)
         for subtask in stack.subtasks:
             codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes, subtask.rotates)
             for source in SOURCES:
                 self._listen(codec, source)
-        self.create_service(
-            Trigger, "~/stop", partial(self._on_trigger, self.core.stop, "stopped")
-        )
-        self.create_service(
-            Trigger, "~/resume", partial(self._on_trigger, self.core.resume, "running")
-        )
+        self.create_service(Trigger, "~/stop", self._on_stop)
+        self.create_service(Trigger, "~/resume", self._on_resume)
         if self.lockstep:
             self.every(WATCH_PERIOD, self._answer_if_complete)
 
@@ -155,17 +148,15 @@ class Controller(ScenarioNode):
         fresh = self.lockstep or age <= self.scenario.general.state_timeout
         return self._state is not None and fresh
 
-    def _on_state(self, data: bytes) -> None:
-        stamp, positions, v, _ = self._joints.decode(data)
-        assert positions is not None  # The codec requires both.
-        assert v is not None
+    def _take_state(self, stamp: int, positions: Array, v: Array) -> None:
+        """Takes joint positions and velocities (n,) of the team at a stamp [ns]."""
         q = self.core.team.configuration_from_joints(positions)
         if self._order.take("joint_states", stamp, self._lead):
             self._begin_anew(stamp)
         self._state_at = time.monotonic()
-        if self._answered is not None and stamp == self._answered[0]:
+        if stamp == self._answered:
             if self.lockstep:  # The team has not seen the answer.
-                self._command_to.publish(self._answered[1])
+                self._link.repeat()
             return
         if self._state is None or stamp != self._state[0]:
             self._waiting_since = self._state_at
@@ -183,7 +174,7 @@ class Controller(ScenarioNode):
 
     def _answer_if_complete(self) -> None:
         """Lockstep: answers the state once all that belongs to its tick has come."""
-        if self._state is None or (self._answered and self._answered[0] == self._state[0]):
+        if self._state is None or self._answered == self._state[0]:
             return
         self._now = seconds(self._state[0])
         self._missing = self._watch.missing(self._now, self._waiting_since)
@@ -195,9 +186,8 @@ class Controller(ScenarioNode):
     def _answer(self, stamp: int, q: Array, v: Array) -> None:
         began = time.perf_counter()
         tick = self.core.step(seconds(stamp), q, v)
-        command = self._commands.encode(stamp, effort=tick.torque)
-        self._command_to.publish(command)
-        self._answered = (stamp, command)
+        self._link.answer(stamp, tick)
+        self._answered = stamp
         self._telemetry.publish(stamp, self.core, tick)
         self._chronicle.note(seconds(stamp), tick)
         self._chronicle.cycle_times.append(time.perf_counter() - began)
@@ -207,18 +197,47 @@ class Controller(ScenarioNode):
         ticker = Ticker(self.scenario.general.rate)
         while self.context.ok():
             ticker.wait()
-            state, answered = self._state, self._answered
-            if state is None or (answered and answered[0] == state[0]):
-                self._work_off()
-                continue
+            self.turn()
+
+    def turn(self) -> None:
+        """Wall time: does what has come in, and answers the newest state unless it is answered."""
+        self._link.poll()
+        self._keep_still(self._link.problem())
+        state = self._state
+        if state is not None:
             self._now = seconds(state[0])
-            self._work_off()
+        self._work_off()
+        if state is not None and self._answered != state[0]:
             self._answer(*state)
 
-    def _on_trigger(
-        self, action: Callable[[], None], text: str, _: Trigger.Request, response: Trigger.Response
-    ) -> Trigger.Response:
-        self._post(action)
+    def _keep_still(self, problem: str) -> None:
+        """Holds the team still, as a stop does, while there is a problem that may go by itself."""
+        if problem == self._chronicle.problem:
+            return
+        self._chronicle.problem = problem
+        if problem:
+            self.get_logger().error(f"holding the team still: {problem}")
+        else:
+            self.get_logger().info("no longer holding the team still")
+        if problem and not self.core.mode.stopped:
+            self.core.stop()
+        elif not problem and not self._stop_asked:
+            self.core.resume()
+
+    def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._stop_asked = True
+        self._post(self.core.stop)
+        return self._done(response, "stopped")
+
+    def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._stop_asked = False
+        if problem := self._chronicle.problem:
+            response.success, response.message = False, f"held still: {problem}"
+            return response
+        self._post(self.core.resume)
+        return self._done(response, "running")
+
+    def _done(self, response: Trigger.Response, text: str) -> Trigger.Response:
         self.get_logger().info(text)
         response.success, response.message = True, text
         return response
@@ -226,8 +245,11 @@ class Controller(ScenarioNode):
     def status(self) -> tuple[Level, str, dict[str, object]]:
         """State machine, cycle times, condition of the subtasks, silent sources."""
         now = time.monotonic()
-        waiting = self._missing if now - self._waiting_since > WAIT_SHOWN else []
-        age = None if self._state is None else now - self._state_at
+        if self._state is None:
+            age, waiting = None, self._link.waiting_for()
+        else:
+            age = now - self._state_at
+            waiting = self._missing if now - self._waiting_since > WAIT_SHOWN else []
         return self._chronicle.status(self._now, age, waiting, self._watch.absent)
 
 

@@ -102,7 +102,13 @@ class ScenarioNode(Node):
         self._diagnostics.publish(to_diagnostics(now, [status]))
 
     def subscribe(
-        self, kind: type, topic: str, take: Callable[[Any], None], *, raw: bool = False
+        self,
+        kind: type,
+        topic: str,
+        take: Callable[[Any], None],
+        *,
+        raw: bool = False,
+        qos: QoSProfile = LOOP_QOS,
     ) -> None:
         """Subscribes; what `take` refuses with an InputError is counted, named and dropped."""
 
@@ -113,7 +119,7 @@ class ScenarioNode(Node):
                 except InputError as error:
                     self.refuse(topic, str(error))
 
-        self.create_subscription(kind, topic, checked, LOOP_QOS, raw=raw)
+        self.create_subscription(kind, topic, checked, qos, raw=raw)
 
     def every(self, period: float, work: Callable[[], None]) -> None:
         """Has something done again and again, each period [s] of wall time."""

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
 
@@ -20,11 +19,11 @@ from noninteract_ros.control.inputs import HORIZON
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes import messages
 from noninteract_ros.nodes.body_poses import BodyPoses
-from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.lockstep import StampOrder
 from noninteract_ros.nodes.messages import Level
 from noninteract_ros.nodes.node import LATCHED_QOS, LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
+from noninteract_ros.nodes.robot_ports import RobotPorts
 
 RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is sent again
 
@@ -43,8 +42,6 @@ class RobotTeam(ScenarioNode):
         team = self.scenario.build_team()
         self._team = team
         self._simulation = self.scenario.build_simulation(team, self.scenario.build_stack(team))
-        self._states = JointStateCodec(team.joint_names)
-        self._commands = JointStateCodec(team.joint_names, required=("effort",))
         self._telemetry = max(1, round(general.rate / general.telemetry_rate))
         self._lock = threading.Lock()
         self._paced = self.lockstep and general.real_time
@@ -57,7 +54,7 @@ class RobotTeam(ScenarioNode):
         self._command_at = -np.inf
         self._braking = False
         self._end_tick = round(general.end_time * general.rate) if general.end_time else None
-        self._publish_to = self.create_publisher(JointState, "joint_states", LOOP_QOS)
+        self._ports = RobotPorts(self, team, self._on_command)
         self._describe()
         self._bodies = BodyPoses(self, self._simulation)
         self._wrenches = [
@@ -67,7 +64,6 @@ class RobotTeam(ScenarioNode):
         self._clock_to = (
             self.create_publisher(Clock, "/clock", LOOP_QOS) if general.publish_clock else None
         )
-        self.subscribe(JointState, "joint_commands", self._on_command, raw=True)
         for robot in team.robots:
             tool = f"{robot.name}/{robot.tool_frame}"
             self.subscribe(
@@ -85,10 +81,13 @@ class RobotTeam(ScenarioNode):
             publisher = self.create_publisher(String, f"{name}/robot_description", LATCHED_QOS)
             publisher.publish(String(data=block.description(name)))
 
-    def _on_command(self, data: bytes) -> None:
-        stamp, _, _, effort = self._commands.decode(data)
-        assert effort is not None  # The codec requires it.
+    def _on_command(self, told: int | None, effort: np.ndarray) -> None:
+        """Takes torques (n,) and the stamp [ns] of the state that they answer, where it is told.
+
+        Who tells none is believed to answer the last state.
+        """
         with self._lock:
+            stamp = self._stamp if told is None else told
             if self.lockstep and stamp == self._stamp_before != self._stamp:
                 return  # A second answer to a state that was sent twice.
             self._check_command(stamp)
@@ -132,7 +131,10 @@ class RobotTeam(ScenarioNode):
         """One tick, then the state that follows."""
         if self._finished():
             return
-        self._simulation.step(torque)
+        simulation = self._simulation
+        if torque is not None:
+            torque = self._ports.applied(torque, simulation.q, simulation.v)
+        simulation.step(torque)
         self._command = self._command if not self.lockstep else None
         self._publish()
 
@@ -159,9 +161,8 @@ class RobotTeam(ScenarioNode):
                 publisher.publish(messages.to_wrench_stamped(self._stamp, wrench))
             self._bodies.publish(self._stamp)
         positions = self._team.joints_from_configuration(simulation.q)
-        self._publish_to.publish(
-            self._states.encode(self._stamp, positions, simulation.v, simulation.torque)
-        )
+        told = (positions, simulation.v, simulation.torque)
+        self._ports.tell(self._stamp, simulation.tick, told)
 
     def _resend(self) -> None:
         """Sends an unanswered state again: the first one, or one whose answer was lost."""
@@ -258,6 +259,8 @@ class RobotTeam(ScenarioNode):
             return Level.WARN, "waiting for the command that answers the state", values
         if self._braking:
             return Level.ERROR, "braking: no fresh command", values
+        if silent := self._ports.silent():
+            return Level.ERROR, f"braking {', '.join(silent)}: no fresh command", values
         return Level.OK, "running", values
 
 

@@ -11,12 +11,13 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import join, key
 from noninteract_ros.team.joint_coordinates import JointCoordinates
+from noninteract_ros.team.wiring import Wiring
 
 ROUNDING = 1e-9  # [m or rad] by which a position may pass a limit.
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointSettings:
+class JointSettings(Wiring):
     """Keys that every robot has for its joints: one number for all, or one per joint.
 
     Friction acts in the simulation alone. The controller does not know it, as it does not know
@@ -49,8 +50,9 @@ class JointSettings:
 
         Raises:
             ScenarioError: A list has another length, a limit does not fit, or a joint moves no
-                mass.
+                mass, or its topics do not fit.
         """
+        self.check_wiring(name, joint_names(model))
         nothing = np.zeros(model.nv)
         model.damping = self._spread(name, model, "friction", nothing)
         model.armature = self._spread(name, model, "armature", nothing)

@@ -7,6 +7,7 @@ from noninteract_ros.team.planar_arm import PlanarArm
 from noninteract_ros.team.point_mass import PointMass
 from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.urdf import UrdfRobot
+from noninteract_ros.team.wiring import Wiring
 
 
 class RobotBlock(Protocol):
@@ -17,6 +18,10 @@ class RobotBlock(Protocol):
 
     def description(self, name: str) -> str:
         """Its URDF, in the frame of its base."""
+
+    @property
+    def wiring(self) -> Wiring:
+        """Its topics."""
 
 
 ROBOT_MODELS: dict[str, type[RobotBlock]] = {

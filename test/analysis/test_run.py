@@ -246,6 +246,14 @@ def test_scenario_topics_and_times(tmp_path: Path) -> None:
     np.testing.assert_array_equal(run.log_times("a"), [5 * 10**8, 15 * 10**8])
 
 
+def test_the_teams_topics_come_before_those_of_its_robots(tmp_path: Path) -> None:
+    """A name without its namespace means the topic nearest to the root, where there is one."""
+    topics = ("/team/left/joint_states", "/team/joint_states", "/team/right/joint_states")
+    run = record(tmp_path, *((topic, joints(0, [topic[6]])) for topic in topics))
+    assert list(run.joints("joint_states").names) == ["j"]
+    assert list(run.joints("right/joint_states").names) == ["r"]
+
+
 def test_wrong_topics_are_named_with_the_right_ones(tmp_path: Path) -> None:
     """Missing, ambiguous and mistyped topics each give an error that says what there is."""
     run = record(tmp_path, *((topic, joints(0, ["a"])) for topic in ("/x/state", "/y/state")))

@@ -1,0 +1,84 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Robots with topics of their own, as programs of their own: the same motion as in one program."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from harness import Ear, Ros, go, merged, until
+from programs import Programs
+from repository import ROOT
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+
+from noninteract_ros.rehearsal import rehearse
+from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario_file import read_parameters
+
+NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
+
+
+def own_robots(**changes: Any) -> dict[str, Any]:
+    return merged(read_parameters(ROOT / "config" / "own_robots.yaml"), changes)
+
+
+def test_the_wiring_changes_nothing_in_lockstep(ros: Ros, programs: Programs) -> None:
+    """Over 0.5 s of motion the states are those of a rehearsal, to rounding of gravity."""
+    values = own_robots(end_time=0.5, start_paused=True, haptic={"start_time": 0.05})
+    ear = ros.ear(values)
+    programs.start_all(NAMES, values, ear)
+    go(ros)
+    until(ear.says("robot_team", "finished"), f"the end: {ear.status}")
+    _, q, v, effort = ear.history(ear.states)
+    expected = rehearse(Scenario.from_dict(values), 0.5)
+    assert len(q) == 501
+    assert np.abs(expected.q[-1] - expected.q[0]).max() > 1e-3
+    np.testing.assert_allclose(q[:-1], expected.q, atol=1e-12)
+    np.testing.assert_allclose(v[:-1], expected.v, atol=1e-12)
+    np.testing.assert_allclose(effort[1:], expected.torque, atol=1e-9)
+
+
+def test_in_wall_time_they_reach_and_hold_a_place(ros: Ros, programs: Programs) -> None:
+    """Two arms that speak at different times are led; without a controller each brakes."""
+    values = own_robots(
+        lockstep=False,
+        rate=200.0,
+        telemetry_rate=50.0,
+        max_state_skew=0.3,
+        command_timeout=0.5,
+        state_timeout=1.0,
+        right={"joint_states_rate": 100.0},
+        cooperative={"stiffness": [40.0], "damping": [40.0], "takeover": "shaped"},
+        relative={"stiffness": [60.0], "damping": [30.0], "takeover": "shaped"},
+        haptic={"motion": "still", "centre": [0.0, 0.5], "start_time": 0.0, "update_rate": 50.0},
+    )
+    ear = ros.ear(values)
+    team = Scenario.from_dict(values).build_team()
+
+    def middle() -> Any:
+        newest = ear.newest().position if ear.states else team.q0
+        return team.state(np.array(newest), np.zeros(4)).tool_positions[:, ::2].mean(axis=0)
+
+    programs.start_all(NAMES, values, ear)
+    until(lambda: np.abs(middle() - [0.0, 0.5]).max() < 0.01, "the place")
+    programs.kill("controller")
+    until(ear.says("robot_team", "braking: no fresh command"), "the team brakes")
+
+
+@pytest.mark.parametrize("label", ["", "state stamp 0000000000000000007 ns"])
+def test_arrays_that_answer_nothing_do_not_move_a_lockstep_team(ros: Ros, label: str) -> None:
+    """Torques without the stamp of a state, or with a wrong one, are refused with the reason."""
+    values = own_robots(haptic=None, planner=None, lockstep_sources=None)
+    ear: Ear = ros.ear(values)
+    team = ros.make("robot_team", values)
+    sides = [
+        ros.probe.create_publisher(Float64MultiArray, f"{side}_effort_controller/commands", 1)
+        for side in ("left", "right")
+    ]
+    ros.matched(*sides)
+    for publisher in sides:
+        message = Float64MultiArray(data=[0.0, 0.0])
+        message.layout.dim = [MultiArrayDimension(label=label, size=2, stride=2)]
+        publisher.publish(message)
+    expected = "answers no state" if label else "must say what it answers"
+    until(lambda: expected in ear.value("robot_team", "last refusal"), "the refusal")
+    assert team._simulation.tick == 0

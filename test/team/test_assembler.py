@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""States told at different times, made into one: exact together, bounded apart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from noninteract_ros.team.assembler import StateAssembler
+
+NAMES = ["left/a", "left/b", "right/a", "right/b"]
+LEFT, RIGHT = np.array([0, 1]), np.array([2, 3])
+MILLISECOND = 10**6
+
+
+@dataclass
+class Motion:
+    """Joints that swing: q = A sin(w t + p)."""
+
+    amplitude: np.ndarray
+    frequency: np.ndarray
+    phase: np.ndarray
+
+    def at(self, time_ns: int, order: int) -> np.ndarray:
+        """The derivative of an order at a time."""
+        angle = self.frequency * time_ns * 1e-9 + self.phase + order * np.pi / 2.0
+        return self.amplitude * self.frequency**order * np.sin(angle)
+
+    def largest(self, order: int) -> np.ndarray:
+        """Bound of that derivative."""
+        return self.amplitude * self.frequency**order
+
+
+MOTION = Motion(
+    np.array([0.4, 0.2, 0.3, 0.5]), np.array([2.0, 7.0, 5.0, 3.0]), np.array([0.0, 1.0, 2.0, 0.7])
+)
+
+
+def tell(assembler: StateAssembler, joints: np.ndarray, stamp: int) -> None:
+    assembler.take(joints, stamp, MOTION.at(stamp, 0)[joints], MOTION.at(stamp, 1)[joints])
+
+
+def worst(prediction: str, offset_ns: int) -> tuple[np.ndarray, np.ndarray]:
+    """Largest errors of the joints' positions and velocities, the right robot's states offset."""
+    assembler = StateAssembler(NAMES, prediction, 0.02)
+    errors = []
+    for tick in range(2000):
+        stamp = tick * MILLISECOND
+        tell(assembler, RIGHT, stamp)
+        if tick < 5:  # So that accelerations are known.
+            tell(assembler, LEFT, stamp)
+            continue
+        tell(assembler, LEFT, stamp + offset_ns)
+        state = assembler.assemble()
+        assert state.stamp_ns == stamp + offset_ns
+        assert not state.late.any()
+        np.testing.assert_allclose(state.ages[RIGHT], offset_ns * 1e-9)
+        true = MOTION.at(state.stamp_ns, 0), MOTION.at(state.stamp_ns, 1)
+        errors.append([state.position - true[0], state.velocity - true[1]])
+    position, velocity = np.abs(errors).max(axis=0)
+    return position, velocity
+
+
+@pytest.mark.parametrize("prediction", ["velocity", "acceleration"])
+def test_equal_stamps_change_nothing(prediction: str) -> None:
+    """Told of the same time, the state is what was told, to the bit."""
+    assembler = StateAssembler(NAMES, prediction, 0.02)
+    for tick in range(50):
+        tell(assembler, RIGHT, tick * MILLISECOND)
+        tell(assembler, LEFT, tick * MILLISECOND)
+        assert assembler.simultaneous
+        state = assembler.assemble()
+        np.testing.assert_array_equal(state.position, MOTION.at(tick * MILLISECOND, 0))
+        np.testing.assert_array_equal(state.velocity, MOTION.at(tick * MILLISECOND, 1))
+
+
+@pytest.mark.parametrize("offset_ms", [0.5, 1.0, 2.0, 3.0])
+def test_constant_velocity_errs_by_no_more_than_the_acceleration_allows(offset_ms: float) -> None:
+    """At most a d^2 / 2 in position and a d in velocity, and near that: the bound is sharp."""
+    d = offset_ms * 1e-3
+    position, velocity = worst("velocity", round(offset_ms * MILLISECOND))
+    a = MOTION.largest(2)
+    assert not position[LEFT].any()
+    assert not velocity[LEFT].any()
+    assert (position[RIGHT] <= 0.5 * a[RIGHT] * d**2).all()
+    assert (position[RIGHT] >= 0.45 * a[RIGHT] * d**2).all()
+    assert (velocity[RIGHT] <= a[RIGHT] * d).all()
+    assert (velocity[RIGHT] >= 0.9 * a[RIGHT] * d).all()
+
+
+@pytest.mark.parametrize("offset_ms", [0.5, 1.0, 2.0, 3.0])
+def test_measured_acceleration_errs_one_order_less(offset_ms: float) -> None:
+    """At most j (d^3 / 6 + h d^2 / 4) and j (d^2 + h d) / 2, with h = 1 ms between states."""
+    d, h = offset_ms * 1e-3, 1e-3
+    position, velocity = worst("acceleration", round(offset_ms * MILLISECOND))
+    j = MOTION.largest(3)[RIGHT]
+    assert (position[RIGHT] <= j * (d**3 / 6.0 + h * d**2 / 4.0) * 1.001).all()
+    assert (position[RIGHT] >= 0.8 * j * (d**3 / 6.0 + h * d**2 / 4.0)).all()
+    assert (velocity[RIGHT] <= j * (d**2 + h * d) / 2.0 * 1.001).all()
+    assert (velocity[RIGHT] >= 0.8 * j * (d**2 + h * d) / 2.0).all()
+
+
+def test_a_state_told_again_keeps_the_acceleration() -> None:
+    """A repeated message, as after a lost answer, is no news."""
+    assembler = StateAssembler(NAMES, "acceleration", 0.02)
+    for tick in (0, 1, 1):
+        tell(assembler, RIGHT, tick * MILLISECOND)
+    tell(assembler, LEFT, 3 * MILLISECOND)
+    state = assembler.assemble()
+    expected = MOTION.at(3 * MILLISECOND, 1)
+    assert (np.abs(state.velocity - expected)[RIGHT] < 0.1 * MOTION.largest(2)[RIGHT] * 2e-3).all()
+
+
+def test_a_late_robot_rests_where_it_was() -> None:
+    """Beyond the bound nothing is guessed: last position, no velocity; the others go on."""
+    assembler = StateAssembler(NAMES, "velocity", 0.02)
+    tell(assembler, RIGHT, 0)
+    tell(assembler, LEFT, 20 * MILLISECOND)
+    assert not assembler.assemble().late.any()
+    tell(assembler, LEFT, 21 * MILLISECOND)
+    state = assembler.assemble()
+    np.testing.assert_array_equal(state.late, [False, False, True, True])
+    np.testing.assert_array_equal(state.position[RIGHT], MOTION.at(0, 0)[RIGHT])
+    assert not state.velocity[RIGHT].any()
+    np.testing.assert_array_equal(state.velocity[LEFT], MOTION.at(21 * MILLISECOND, 1)[LEFT])
+    tell(assembler, RIGHT, 21 * MILLISECOND)
+    assert not assembler.assemble().late.any()
+
+
+def test_joints_may_be_told_of_one_by_one() -> None:
+    """A message may hold some joints only; nothing is told before every joint is known."""
+    assembler = StateAssembler(NAMES, "velocity", 0.02)
+    for joint in range(4):
+        assert not assembler.fresh
+        assert assembler.unheard == NAMES[joint:]
+        tell(assembler, np.array([joint]), joint * MILLISECOND // 4)
+    assert assembler.fresh
+    assert not assembler.simultaneous
+    state = assembler.assemble()
+    assert not assembler.fresh
+    np.testing.assert_allclose(state.ages, [0.75e-3, 0.5e-3, 0.25e-3, 0.0])
+    assembler.forget(LEFT)
+    assert assembler.unheard == NAMES[:2]
+    assert not assembler.fresh
+
+
+def test_efforts_are_those_that_were_measured() -> None:
+    """Where none came, or NaN, there is NaN."""
+    assembler = StateAssembler(NAMES, "velocity", 0.02)
+    tell(assembler, LEFT, 0)
+    nothing = np.zeros(2)
+    assembler.take(RIGHT, 0, nothing, nothing, np.array([3.0, np.nan]))
+    np.testing.assert_array_equal(assembler.assemble().effort, [np.nan, np.nan, 3.0, np.nan])
