@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from noninteract_ros.console.settings import ConsoleSettings
+from noninteract_ros.control.energy_tank import TankSettings
 from noninteract_ros.control.inputs import SOURCES
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.team_controller import TeamController
@@ -56,6 +57,7 @@ class Scenario:
         surroundings: Objects, doors and walls, by name.
         safety: Behaviour at singularities and joint limits.
         console: The operator's console, or None.
+        tank: The energy account.
     """
 
     general: General
@@ -70,6 +72,7 @@ class Scenario:
     surroundings: Mapping[str, SurroundingBlock]
     safety: SafetySettings
     console: ConsoleSettings | None
+    tank: TankSettings
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "Scenario":
@@ -98,6 +101,7 @@ class Scenario:
             },
             load_optional(SafetySettings, values, "safety") or SafetySettings(),
             load_optional(ConsoleSettings, values, "console"),
+            load_optional(TankSettings, values, "tank") or TankSettings(),
         )
         scenario.check()
         return scenario
@@ -107,6 +111,7 @@ class Scenario:
         blocks: list[tuple[str, object | None]] = [("", self.general)]
         blocks += [*self.robots.items(), *self.pushes.items(), *self.surroundings.items()]
         blocks += [("object", self.held), ("haptic", self.haptic), ("link", self.link)]
+        blocks.append(("tank", self.tank))
         blocks += [("planner", self.planner), ("safety", self.safety), ("console", self.console)]
         blocks += [(f"planner.{name}", block) for name, block in self.formations.items()]
         for name, spec in self.subtasks.items():
@@ -124,6 +129,7 @@ class Scenario:
         self.safety.check()
         if self.console:
             self.console.check()
+        self.tank.check()
         if len(self.general.gravity) != 3:
             raise ScenarioError("gravity", list(self.general.gravity), "3 numbers")
         sources = [join_source(name, source) for name in self.subtasks for source in SOURCES]
@@ -186,6 +192,7 @@ class Scenario:
             self.general.stop_rate,
             self.general.state_timeout,
             self.safety,
+            self.tank,
         )
 
     def build_simulation(self, team: Team, stack: SubtaskStack) -> TeamSimulation:

@@ -17,7 +17,7 @@ from noninteract_ros.subtasks.registry import SubtaskBlock, kind_named
 from noninteract_ros.team.assembler import PREDICTIONS
 from noninteract_ros.team.registry import ROBOT_MODELS, RobotBlock
 
-OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console")
+OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console", "tank")
 LISTINGS = ("robots", "subtasks", "pushes", "surroundings")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # What may be a part of a topic's name.
 # Every ROS node has these of its own.
@@ -34,7 +34,7 @@ class General:
     duration: float = key("How long a demo runs [s]", 20.0, positive=True)
     lockstep: bool = key("Step only when the command that answers a state has come", True)
     real_time: bool = key("In lockstep: never run ahead of wall time", False)
-    law: str = key("Control law", "noninteracting", choices=LAWS, live=True)
+    law: str = key("Control law", "energy_gated", choices=LAWS, live=True)
     gravity: tuple[float, ...] = key("Gravity in the world [m/s^2]", (0.0, 0.0, -9.81))
     telemetry_rate: float = key(
         "Rate of subtask states, energies and external wrenches [Hz]", 250.0, positive=True

@@ -68,7 +68,7 @@ def test_a_whole_scenario_builds_all_its_parts():
     assert stack.names == ("cooperative", "relative")
     controller = scenario.build_controller(team, stack)
     np.testing.assert_array_equal(controller.mode.impedance.stiffness, [25.0, 25.0, 50.0, 50.0])
-    assert controller.mode.law == "noninteracting"
+    assert controller.mode.law == "energy_gated"
     assert controller.inputs["cooperative"].authority == "human"
     assert controller.inputs["relative"].authority == "hold"
     assert scenario.build_simulation(team, stack).rate == 1000.0

@@ -25,7 +25,8 @@ from noninteract_ros.team.team import TeamState
 # [m] at 1 kHz for errors up to 1 m: holding the torque over a tick is of first order in the tick,
 # and the equations are linear (a saturating potential only weakens them).
 LIMIT = 2e-3
-LAWS = ("noninteracting", "paper")  # On point masses they are the same law.
+# On point masses they are the same law, as long as the gates of the first are open.
+LAWS = ("energy_gated", "noninteracting", "paper")
 RTOL, ATOL = 1e-10, 1e-12
 SPACING = 0.005  # [s] closer references make a quintic noisy with rounding
 
@@ -219,7 +220,7 @@ def _require(recorded: Recorded, subtask: str, outside: list[Influence]) -> None
         f"the team touches {', '.join(scenario.surroundings)}": bool(scenario.surroundings),
         "a push acts elsewhere than on a tool": not on_tools,
         FRICTION: recorded.team.friction.any(),
-        f"limits of joints changed the torques of {changed} ticks": changed > 0,
+        f"limits of joints or energy changed the torques of {changed} ticks": changed > 0,
         f"not in the scenario: {'; '.join(foreign)}": bool(foreign),
     }
     for reason, holds in reasons.items():

@@ -28,7 +28,7 @@ MOVED = 1e-9
 SAME = 1e-12  # [m, m/s] the same arithmetic on another processor may round differently
 # (29) keeps a subtask on its reference whatever others do; how it comes back is another thing.
 OFF = "a subtask is off its reference, and its inertia depends on where the others are"
-DECOUPLING_LAWS = ("noninteracting", "paper")
+DECOUPLING_LAWS = ("energy_gated", "noninteracting", "paper")
 WINDOW = 2.0  # [s] that side runs go on after the last source has begun
 BUDGET = 400_000  # coordinates times ticks that one rehearsal may take
 
@@ -175,7 +175,9 @@ class Comparer:
         if self._recorded.team.friction.any():
             return FRICTION
         if ticks := self._recorded.interventions(self._side_s):
-            return f"singularities or limits of joints changed the torques of {ticks} ticks"
+            return (
+                f"singularities, limits of joints or energy changed the torques of {ticks} ticks"
+            )
         return ""
 
     def _held_apart(self, without: Joints) -> tuple[Array, Array]:
@@ -274,9 +276,10 @@ def _owned_subtasks(recorded: Recorded) -> dict[str, str]:
 
 
 def _others(recorded: Recorded, law: str) -> list[str]:
-    """Laws to compare with; on constant inertias `paper` is `noninteracting`."""
+    """Laws to compare with; what `energy_gated` is with open gates would tell nothing new."""
     laws = ["noninteracting", "natural"] + ([] if recorded.constant else ["paper"])
-    same = {law, "noninteracting"} if recorded.constant and law == "paper" else {law}
+    alike = law == "energy_gated" or (recorded.constant and law == "paper")
+    same = {law, "noninteracting"} if alike else {law}
     return [name for name in laws if name not in same]
 
 

@@ -21,7 +21,7 @@ from noninteract_ros.analysis.recorded import (
 from noninteract_ros.arrays import Array
 from noninteract_ros.subtasks.layout import Layout
 
-LAWS = ("noninteracting", "paper")
+LAWS = ("energy_gated", "noninteracting", "paper")
 GROWTH = 1e-8  # share of the peak at 1 kHz: what holding the torque over a tick can leave
 PASSIVE = 1e-3  # share of the peak at 1 kHz by which (31) may be missed for the same reason
 SAMPLED = 0.02  # share of the peak at 1 kHz: powers are sampled where the torque is fresh

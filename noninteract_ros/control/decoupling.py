@@ -16,7 +16,7 @@ from noninteract_ros.control.impedance import Impedance
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import TeamState
 
-LAWS = ("noninteracting", "natural", "paper")
+LAWS = ("energy_gated", "noninteracting", "natural", "paper")
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,6 +123,7 @@ class TaskError:
         reference_velocity: Desired velocity.
         reference_acceleration: Desired acceleration.
         force: Force input of the sources, added to (30), remark 1.
+        goal: Force that the subtasks are to press with, added like it; None without any.
     """
 
     e: Array
@@ -130,6 +131,7 @@ class TaskError:
     reference_velocity: Array
     reference_acceleration: Array
     force: Array
+    goal: Array | None = None
 
 
 def task_dynamics(
@@ -185,10 +187,22 @@ def inverses(blocks: Array) -> Array:
 
 
 def commanded_acceleration(
-    law: str, dynamics: TaskDynamics, error: TaskError, impedance: Impedance
+    law: str, dynamics: TaskDynamics, error: TaskError, impedance: Impedance, grip: float = 1.0
 ) -> Array:
-    """Task acceleration that a law asks for, shape (n,): the fast form."""
-    pull = impedance.damping * error.e_rate + impedance.force(error.e) - error.force
+    """Task acceleration that a law asks for, shape (n,): the fast form.
+
+    Of `energy_gated` it is what its open gates give; `gated_law` has the others.
+
+    Args:
+        law: One of `LAWS`.
+        dynamics: Task dynamics at the state.
+        error: Tracking state of the subtasks.
+        impedance: Gains.
+        grip: Share nu of the impedance that is in force.
+    """
+    pull = grip * (impedance.damping * error.e_rate + impedance.force(error.e)) - error.force
+    if error.goal is not None:
+        pull = pull - error.goal
     if law == "natural":
         drift = dynamics.natural_coriolis_force(error.e_rate)
         return error.reference_acceleration - dynamics.divide_by_inertia(drift + pull)

@@ -34,10 +34,14 @@ class SafetyReport:
     clipped: bool = False
 
     @property
+    def cut(self) -> bool:
+        """Whether something was cut off from the torque."""
+        return self.effort_share < 1.0 or self.rate_share < 1.0 or self.clipped
+
+    @property
     def acted(self) -> bool:
         """Whether the torque is another one than the law's."""
-        changed = self.effort_share < 1.0 or self.rate_share < 1.0 or self.clipped
-        return changed or bool(self.repelled or self.too_fast) or not self.finite
+        return self.cut or bool(self.repelled or self.too_fast) or not self.finite
 
 
 class JointSafety:

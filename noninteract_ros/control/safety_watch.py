@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from noninteract_ros.control.energy_account import Account
 from noninteract_ros.control.tick import Tick
 
 LINGER = 1.0  # [s] for which a condition is told after it last held, so that it does not flicker
@@ -51,6 +52,9 @@ class SafetyWatch:
         yield "regularity, lowest", tick.regularity
         yield "effort share, lowest", tick.safety.effort_share
         yield "torque rate share, lowest", tick.safety.rate_share
+        if tick.account.gated:
+            yield "sigma, lowest", tick.account.tank.sigma
+            yield "grip, lowest", tick.account.tank.grip
 
     def _texts(self, tick: Tick) -> Iterator[str]:
         safety = tick.safety
@@ -62,7 +66,16 @@ class SafetyWatch:
             yield "at effort limits"
         if safety.rate_share < 1.0:
             yield "at the torque-rate limit"
+        yield from _gates(tick.account)
         for joint in safety.repelled:
             yield f"{self._joints[joint]} at its position limit"
         for joint in safety.too_fast:
             yield f"{self._joints[joint]} too fast"
+
+
+def _gates(account: Account) -> Iterator[str]:
+    """What the energy account holds back."""
+    if account.gated and account.tank.sigma < 1.0:
+        yield "energy tank low: decoupling reduced, ~/refill restores it"
+    if account.gated and account.tank.grip < 1.0:
+        yield "energy reserve low: impedance yields"

@@ -7,14 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.decoupling import (
-    TaskDynamics,
-    TaskError,
-    commanded_acceleration,
-)
+from noninteract_ros.control.continuity import Continuity
+from noninteract_ros.control.decoupling import TaskError, commanded_acceleration
 from noninteract_ros.control.energy import Energy, energy
+from noninteract_ros.control.energy_gate import EnergyGate, Moment
+from noninteract_ros.control.energy_tank import TankSettings
+from noninteract_ros.control.fade import Fade
+from noninteract_ros.control.gated_law import decoupling, gated_acceleration, without_law
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
-from noninteract_ros.control.joint_safety import JointSafety
+from noninteract_ros.control.joint_safety import JointSafety, SafetyReport
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.singularity import SingularityGuard, best_regularity
 from noninteract_ros.control.structure import Structure
@@ -24,8 +25,7 @@ from noninteract_ros.control.tick import Mode, Tick
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
-DEFAULT_SAFETY = SafetySettings()
-JUMP = 0.1  # [m or rad] a coordinate that is this much further than it can have come was put there
+DEFAULT_SAFETY, DEFAULT_TANK = SafetySettings(), TankSettings()
 
 
 class TeamController:
@@ -41,6 +41,7 @@ class TeamController:
         stop_rate: Decay rate of the velocity after a stop [1/s].
         state_timeout: Gap between states after which every subtask starts anew [s].
         safety: Behaviour at singularities and joint limits.
+        tank: Capacity, levels and rates of the energy account.
     """
 
     def __init__(
@@ -54,6 +55,7 @@ class TeamController:
         stop_rate: float = 10.0,
         state_timeout: float = 0.2,
         safety: SafetySettings = DEFAULT_SAFETY,
+        tank: TankSettings = DEFAULT_TANK,
     ) -> None:
         self.team, self.stack = team, stack
         self._settings = list(impedances)
@@ -63,10 +65,10 @@ class TeamController:
         }
         self._mode = Mode(law, stack_impedance(stack.subtasks, impedances))
         self._left: Mode | None = None
-        self._transition_time, self._stop_rate = transition_time, stop_rate
-        self._state_timeout = state_timeout
-        self._bump, self._bump_start = np.zeros(team.n), -np.inf
-        self._last: tuple[float, Array] | None = None
+        self._stop_rate = stop_rate
+        self._fade = Fade(team.n, transition_time)
+        self._continuity = Continuity(team, state_timeout)
+        self.gate = EnergyGate(team, stack, tank)
         self._view: TeamView = Structure.of(team, stack) or DenseView(team, stack)
         self._guard = SingularityGuard(team, safety, best_regularity(team, stack))
         self._safety = JointSafety(team, safety)
@@ -77,7 +79,9 @@ class TeamController:
         return self._mode
 
     def set_law(self, law: str) -> None:
-        """Changes the law without a bump."""
+        """Changes the law without a bump; the gated one begins with a fresh account."""
+        if law == "energy_gated" and self._mode.law != law:
+            self.gate.restart()
         self._change(replace(self._mode, law=law))
 
     def set_impedance(self, subtask: str, settings: ImpedanceSettings) -> None:
@@ -107,8 +111,9 @@ class TeamController:
 
     def reset(self) -> None:
         """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
-        self._last = None
-        self._bump_start = -np.inf
+        self._continuity.forget()
+        self._fade.forget()
+        self.gate.restart()
         self._guard.reset()
         self._safety.reset()
         for item in self.inputs.values():
@@ -118,57 +123,83 @@ class TeamController:
         self._left = self._left or self._mode
         self._mode = mode
 
-    def step(self, now: float, q: Array, v: Array) -> Tick:
+    def step(self, now: float, q: Array, v: Array, applied: Array | None = None) -> Tick:
         """Torque for the time from `now` to the next tick.
 
         Args:
             now: Time of the state [s]; later than at the last step.
             q: Configuration, shape (nq,).
             v: Velocity, shape (n,).
+            applied: Torque that the team reports to have had until now, shape (n,); None, if it
+                was the last one that was asked for.
         """
         seen = self._view.evaluate(q, v, self._mode.impedance.inertias)
-        state, task, dynamics = seen.state, seen.task, seen.dynamics
-        restarted = self._restart_reason(now, q, v)
-        elapsed = 0.0 if self._last is None else now - self._last[0]
+        restarted = self._continuity.broken(now, q, v)
+        elapsed = self._continuity.elapsed(now)
         step = 0.0 if restarted else elapsed
         # At the tick of a stop the inputs still count, so that the torque starts without a step.
         stopped = self._mode.stopped and (self._left is None or self._left.stopped)
         if restarted or stopped or (self._left and self._left.stopped):
-            self._rest_at(task.x)
+            self._rest_at(seen.task.x)
         if restarted:
             self._guard.reset()
+            self.gate.pause()
         led = tuple(
             item.resting(now) if stopped else item.advance(now, step)
             for item in self.inputs.values()
         )
-        error = self._error(seen, led)
-        relative = self._guard.relative(dynamics.inverse_sizes)
+        relative = self._guard.relative(seen.dynamics.inverse_sizes)
         share = self._guard.law_share(relative)
+        moment = self._moment(now, seen, led, share)
+        if share == 1.0:
+            self.gate.book(moment, self._mode.law, applied)
         recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
-        acceleration, wanted = self._blended(now, seen, error, share, recovery)
+        acceleration, wanted = self._blended(seen, moment, share, recovery)
         asked = self.team.inverse_dynamics(q, v, wanted)
-        torque, safety = self._safety.protect(q, v, asked, state.g, elapsed)
-        self._last = (now, q)
-        x_rate = error.e_rate + error.reference_velocity
-        feedback = self._mode.impedance.damping * error.e_rate + self._mode.impedance.force(
-            error.e
-        )
+        torque, safety = self._safety.protect(q, v, asked, seen.state.g, elapsed)
+        self._remember(moment, torque, acceleration, share, safety)
+        self._continuity.note(now, q)
         return Tick(
             torque,
-            state,
-            task,
-            x_rate,
-            error,
+            seen.state,
+            seen.task,
+            moment.error.e_rate + moment.error.reference_velocity,
+            moment.error,
             led,
-            dynamics,
+            seen.dynamics,
             acceleration,
-            feedback,
+            moment.added.feedback,
             share,
             relative,
             torque - asked,
             safety,
             restarted,
+            self.gate.account,
         )
+
+    def _moment(self, now: float, seen: Seen, led: Sequence[Led], share: float) -> Moment:
+        """This tick as law and account see it."""
+        error, impedance = self._error(seen, led), self._mode.impedance
+        references = [item.reference for item in led]
+        added = (decoupling if share > 0.0 else without_law)(seen.dynamics, error, impedance)
+        q, x = seen.state.q, seen.task.x
+        return Moment(now, q, x, references, error, seen.dynamics, impedance, added)
+
+    def _remember(
+        self,
+        moment: Moment,
+        torque: Array,
+        acceleration: Array,
+        share: float,
+        safety: SafetyReport,
+    ) -> None:
+        """Tells the account what this torque is made of."""
+        if share < 1.0 or not safety.finite:
+            self.gate.pause()  # It is another law's, which has no such account.
+        elif self._mode.stopped:
+            self.gate.remember_damping(moment, torque)
+        else:
+            self.gate.remember(moment, torque, acceleration, not safety.cut)
 
     def energy(self, tick: Tick, external_torque: Array) -> Energy:
         """Storage functions (32) and their rates (33) of a tick.
@@ -187,56 +218,51 @@ class TeamController:
             external_torque + tick.added_torque,
         )
 
-    def _restart_reason(self, now: float, q: Array, v: Array) -> str:
-        if self._last is None:
-            return "the first state"
-        last, q_last = self._last
-        if now - last > self._state_timeout:
-            return f"no state for {now - last:.3f} s"
-        moved = np.abs(self.team.difference(q_last, q))
-        if (moved > JUMP + 2.0 * np.abs(v) * (now - last)).any():
-            joint = self.team.joint_names[int(moved.argmax())]
-            return f"{joint} jumped by {moved.max():.3f}"
-        return ""
-
     def _rest_at(self, x: Array) -> None:
         for item, part in zip(self.inputs.values(), self.stack.value_slices, strict=True):
             item.rest_at(x[part])
 
     def _blended(
-        self, now: float, seen: Seen, error: TaskError, share: float, recovery: Array
+        self, seen: Seen, moment: Moment, share: float, recovery: Array
     ) -> tuple[Array, Array]:
         """Task and joint acceleration of law and recovery together, shape (n,) each."""
         dynamics, v = seen.dynamics, seen.state.v
         if share == 0.0:  # The law is not even defined at a singularity; what fades starts over.
-            self._left, self._bump_start = None, -np.inf
+            self._left = None
+            self._fade.forget()
             return dynamics.acceleration_of(v, recovery), recovery
-        acceleration = self._acceleration(now, seen, error)
+        acceleration = self._acceleration(seen, moment)
         wanted = dynamics.joint_acceleration(v, acceleration)
         if share == 1.0:
             return acceleration, wanted
         wanted = share * wanted + (1.0 - share) * recovery
         return dynamics.acceleration_of(v, wanted), wanted
 
-    def _acceleration(self, now: float, seen: Seen, error: TaskError) -> Array:
+    def _acceleration(self, seen: Seen, moment: Moment) -> Array:
         """Task acceleration in force, with the bump of the last change fading out."""
-        v = seen.state.v
-        wanted = self._wanted(self._mode, v, error, seen.dynamics)
+        v, now = seen.state.v, moment.now
+        wanted = self._wanted(self._mode, v, moment)
         if self._left is not None:
-            left = self._view.again(seen, self._left.impedance.inertias)
-            before = self._wanted(self._left, v, error, left) + self._fading(now)
-            self._bump, self._bump_start, self._left = before - wanted, now, None
-        return wanted + self._fading(now)
+            impedance = self._left.impedance
+            left = self._view.again(seen, impedance.inertias)
+            added = decoupling(left, moment.error, impedance)
+            was = replace(moment, dynamics=left, impedance=impedance, added=added)
+            before = self._wanted(self._left, v, was) + self._fade.at(now)
+            self._fade.begin(now, before - wanted)
+            self._left = None
+        fading = self._fade.at(now)
+        return wanted + fading if fading.any() else wanted
 
-    def _fading(self, now: float) -> Array:
-        progress = (now - self._bump_start) / self._transition_time
-        if progress >= 1.0:
-            return np.zeros_like(self._bump)
-        return self._bump * (1.0 - progress) ** 2 * (1.0 + 2.0 * progress)
-
-    def _wanted(self, mode: Mode, v: Array, error: TaskError, dynamics: TaskDynamics) -> Array:
+    def _wanted(self, mode: Mode, v: Array, moment: Moment) -> Array:
+        dynamics, error = moment.dynamics, moment.error
         if mode.stopped:
             return dynamics.acceleration_of(v, -self._stop_rate * v)
+        if mode.law == "energy_gated":
+            return gated_acceleration(
+                dynamics, error, mode.impedance, moment.added, self.gate.tank
+            )
+        if mode.law == "noninteracting":
+            return moment.added.acceleration
         return commanded_acceleration(mode.law, dynamics, error, mode.impedance)
 
     def _error(self, seen: Seen, led: Sequence[Led]) -> TaskError:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.decoupling import TaskDynamics, TaskError
+from noninteract_ros.control.energy_account import Account
 from noninteract_ros.control.impedance import Impedance
 from noninteract_ros.control.joint_safety import SafetyReport
 from noninteract_ros.control.subtask_input import Led
@@ -47,6 +48,7 @@ class Tick:
         added_torque: What the limits of the joints added to the torque, shape (n,) [N or N m].
         safety: Why they did.
         restarted: Why every subtask was put to rest where it is, or an empty text.
+        account: The energy account as of this tick, kept whatever the law.
     """
 
     torque: Array
@@ -63,8 +65,9 @@ class Tick:
     added_torque: Array
     safety: SafetyReport
     restarted: str
+    account: Account
 
     @property
     def intervened(self) -> bool:
         """Whether the torque is another one than the law's."""
-        return self.law_share < 1.0 or self.safety.acted
+        return self.law_share < 1.0 or self.safety.acted or self.account.closing

@@ -251,7 +251,7 @@ def test_both_forms_of_the_torque_agree(law, keys):
         if law == "natural":
             plain = natural_torque(dynamics, error, case.impedance)
         else:
-            matrices = {"noninteracting": subtask_coriolis, "paper": paper_subtask_coriolis}[law]
+            matrices = paper_subtask_coriolis if law == "paper" else subtask_coriolis
             plain = plain_torque(dynamics, state.v, error, case.impedance, matrices(dynamics))
         fast = case.torque(law, state, error)
         np.testing.assert_allclose(fast, plain, atol=1e-11 * np.abs(plain).max())

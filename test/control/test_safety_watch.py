@@ -11,14 +11,22 @@ from noninteract_ros.control.safety_watch import LINGER, SafetyWatch
 JOINTS = ("left/joint_1", "left/joint_2")
 
 
-def tick(law_share: float = 1.0, regularity: float = 0.8, **report) -> SimpleNamespace:
+def tick(
+    law_share: float = 1.0,
+    regularity: float = 0.8,
+    sigma: float = 1.0,
+    grip: float = 1.0,
+    **report,
+) -> SimpleNamespace:
     """What the watch looks at of a tick."""
     safety = SafetyReport(**report)
+    tank = SimpleNamespace(sigma=sigma, grip=grip)
     return SimpleNamespace(
         law_share=law_share,
         regularity=regularity,
         safety=safety,
-        intervened=law_share < 1.0 or safety.acted,
+        intervened=law_share < 1.0 or safety.acted or sigma < 1.0 or grip < 1.0,
+        account=SimpleNamespace(gated=True, tank=tank),
     )
 
 
@@ -28,6 +36,8 @@ def tick(law_share: float = 1.0, regularity: float = 0.8, **report) -> SimpleNam
         ({}, []),
         ({"law_share": 0.4}, ["near a singularity: recovering"]),
         ({"effort_share": 0.9}, ["at effort limits"]),
+        ({"sigma": 0.99}, ["energy tank low: decoupling reduced, ~/refill restores it"]),
+        ({"grip": 0.99}, ["energy reserve low: impedance yields"]),
         ({"clipped": True}, ["at effort limits"]),
         ({"repelled": (0,)}, ["left/joint_1 at its position limit"]),
         ({"rate_share": 0.0}, ["at the torque-rate limit"]),

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from planar_arms import UNLIKE, PlanarArms
 
+from noninteract_ros.control.continuity import JUMP
 from noninteract_ros.control.decoupling import LAWS, commanded_acceleration
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
 from noninteract_ros.control.inputs import Force, Rate, Target
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.control.subtask_input import InputSettings
-from noninteract_ros.control.team_controller import JUMP, TeamController
+from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.simulation.plant import Plant

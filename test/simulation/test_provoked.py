@@ -125,7 +125,7 @@ def test_effort_limits():
 
 def test_wall():
     """Both tools press with half the cooperative force, slide along, and come off again."""
-    found = Provoked("wall").run(9.0)
+    found = Provoked("wall", law="natural").run(9.0)
     forces = -found.wrenches[:, :, 1]
     assert (forces >= 0.0).all()
     x = found.column(lambda t: t.task.x)
@@ -136,6 +136,23 @@ def test_wall():
     assert forces[:500].max() == forces[-500:].max() == 0.0
     assert found.column(error)[-1].max() < 1e-3
     assert not any(tick.intervened for tick in found.ticks)
+
+
+def test_wall_without_crossing_over():
+    """The gated law presses as its closed loop says, out of one tank, and comes off again."""
+    found = Provoked("wall").run(9.0)
+    wrenches = found.wrenches
+    assert (wrenches[:, :, 1] <= 0.0).all()
+    for k in range(4 * 500, 5 * 500, 50):
+        tick = found.ticks[k]
+        torque = found.rehearsal.team.external_torque(tick.state, wrenches[k])
+        resting = tick.dynamics.decoupled_external_force(torque)
+        np.testing.assert_allclose(resting[1], tick.feedback[1], rtol=0.02)
+        assert resting[1] < -10.0
+    assert np.abs(wrenches[-500:]).max() == 0.0
+    assert found.column(error)[-1].max() < 1e-3
+    assert not any(tick.intervened for tick in found.ticks)
+    assert found.column(lambda t: t.account.tank.level).min() > 0.9
 
 
 def test_carry():
@@ -184,9 +201,25 @@ def test_a_passive_door_makes_noninteracting_unstable_and_natural_not():
     assert v.max() < 1e-4
 
 
+def test_the_gated_law_settles_at_the_door_that_shakes_others():
+    """It spends its tank on the shaking, closes, and comes to rest; nothing is created."""
+    found = Provoked("door", 1000.0).run(6.0)
+    accounts = [tick.account for tick in found.ticks]
+    assert found.rehearsal.simulation.plant_q[-1] == pytest.approx(0.4, abs=1e-3)
+    assert spread(found)[-1] < 1e-5
+    sigma = np.array([account.tank.sigma for account in accounts])
+    assert sigma[0] == 1.0
+    assert 0.0 < sigma[-1] < 0.6
+    assert np.ptp(sigma[-1000:]) == 0.0
+    assert min(account.tank.level for account in accounts) > 0.0
+    for account in accounts:
+        assert account.sound
+        assert account.residual == pytest.approx(-account.tank.lost, abs=account.bound)
+
+
 def test_door():
     """Opened by 0.4 rad under the natural law, the door comes to rest with its robots on it."""
-    found = Provoked("door", 1000.0).run(6.0)
+    found = Provoked("door", 1000.0, law="natural").run(6.0)
     angle = found.rehearsal.simulation.plant_q[-1]
     assert angle == pytest.approx(0.4, abs=1e-3)
     assert spread(found)[-1] < 1e-5
