@@ -148,7 +148,8 @@ class TeamController:
             item.resting(now) if stopped else item.advance(now, step)
             for item in self.inputs.values()
         )
-        relative = self._guard.relative(seen.dynamics.inverse_sizes)
+        regular = self._guard.relative(seen.dynamics.inverse_sizes)
+        relative = min(regular, self.stack.soundness(seen.state))
         share = self._guard.law_share(relative)
         moment = self._moment(now, seen, led, share)
         if share == 1.0:

@@ -12,6 +12,7 @@ since A' e = E' e = e. So h = V'(|e|) e / |e| is the exact gradient of V with re
 velocity error, and the storage balance (33) holds to the letter. At |e| = pi the shortest way
 changes sides: V is continuous there and greatest, h is bounded and jumps to its opposite, both of
 which pull away from that set, so that a motion crosses it or leaves it and never slides along it.
+Angles about one axis are plain numbers that start again after a turn; half a turn does the same.
 """
 
 from collections.abc import Sequence
@@ -35,6 +36,8 @@ class Layout:
     Args:
         rotates: For each element, whether a quaternion (x, y, z, w) ends it.
         plain: For each element, how many plain numbers it begins with.
+        angles: For each element, whether these are angles [rad] of which those a whole turn apart
+            are the same; by default none. Their differences go the shorter way round.
 
     Attributes:
         size: How many numbers a value has.
@@ -46,14 +49,19 @@ class Layout:
         angular: Places of their angular velocities in a velocity, shape (r, 3).
     """
 
-    def __init__(self, plain: Sequence[int], rotates: Sequence[bool]) -> None:
-        self._elements = tuple(zip(plain, rotates, strict=True))
+    def __init__(
+        self, plain: Sequence[int], rotates: Sequence[bool], angles: Sequence[bool] | None = None
+    ) -> None:
+        kinds = zip(plain, rotates, angles or (False,) * len(plain), strict=True)
+        self._elements = tuple(kinds)
         values: list[int] = []
         rates: list[int] = []
         quaternions: list[range] = []
         angular: list[range] = []
+        angles_too: list[bool] = []
         size = dim = 0
-        for count, turns in self._elements:
+        for count, turns, around in self._elements:
+            angles_too += [around] * count
             values += range(size, size + count)
             rates += range(dim, dim + count)
             size, dim = size + count, dim + count
@@ -65,6 +73,8 @@ class Layout:
         self.values, self.rates = np.array(values, dtype=int), np.array(rates, dtype=int)
         self.quaternions = np.array(quaternions, dtype=int).reshape(-1, 4)
         self.angular = np.array(angular, dtype=int).reshape(-1, 3)
+        wound = np.array(angles_too, dtype=bool)
+        self._wound, self._wound_rates = self.values[wound], self.rates[wound]
 
     @classmethod
     def numbers(cls, count: int) -> "Layout":
@@ -75,7 +85,11 @@ class Layout:
     def joined(cls, layouts: Sequence["Layout"]) -> "Layout":
         """Several values, one after the other."""
         elements = [element for layout in layouts for element in layout._elements]
-        return cls([plain for plain, _ in elements], [turns for _, turns in elements])
+        return cls(
+            [plain for plain, _, _ in elements],
+            [turns for _, turns, _ in elements],
+            [wound for _, _, wound in elements],
+        )
 
     @cached_property
     def identity(self) -> Array:
@@ -102,13 +116,20 @@ class Layout:
         return result
 
     def difference(self, x: Array, x_d: Array) -> Array:
-        """x - x_d; for rotations log(R R_d'), shape (..., dim)."""
+        """x - x_d; for rotations log(R R_d'), for angles within [-pi, pi]; shape (..., dim)."""
         if not self.rotates:
-            return x - x_d
+            return self._shorter(x - x_d)
         e = np.empty((*np.broadcast_shapes(x.shape, x_d.shape)[:-1], self.dim))
         e[..., self.rates] = x[..., self.values] - x_d[..., self.values]
         q, q_d = x[..., self.quaternions], x_d[..., self.quaternions]
         e[..., self.angular] = so3.log(so3.product(q, so3.inverse(q_d)))
+        return self._shorter(e)
+
+    def _shorter(self, e: Array) -> Array:
+        """Differences of angles the shorter way round, exactly as they are within half a turn."""
+        if self._wound.size:
+            way = e[..., self._wound_rates]
+            e[..., self._wound_rates] = way - 2.0 * np.pi * np.round(way / (2.0 * np.pi))
         return e
 
     def sum(self, x: Array, gap: Array) -> Array:
@@ -195,9 +216,10 @@ class Layout:
         return result
 
     def origin(self, x: Array) -> Array:
-        """Where coordinates near x are counted from: zeros, and x's own rotations."""
+        """Where coordinates near x are counted from: zeros, and x's own rotations and angles."""
         result = self.identity.copy()
         result[self.quaternions] = x[self.quaternions]
+        result[self._wound] = x[self._wound]
         return result
 
     def _carried(self, phi: Array, base: Motion) -> tuple[Array, Array]:

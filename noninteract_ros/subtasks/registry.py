@@ -16,6 +16,7 @@ from noninteract_ros.errors import ScenarioError, one_of
 from noninteract_ros.schema import keys_of
 from noninteract_ros.subtasks.cooperative_pose import CooperativeOrientation, CooperativePose
 from noninteract_ros.subtasks.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.elbow_angle import ElbowAngle
 from noninteract_ros.subtasks.posture import Posture
 from noninteract_ros.subtasks.relative_pose import RelativeOrientation, RelativePose
 from noninteract_ros.subtasks.relative_position import RelativePosition
@@ -38,6 +39,7 @@ SUBTASK_KINDS: dict[str, type[SubtaskBlock]] = {
     "relative_orientation": RelativeOrientation,
     "relative_pose": RelativePose,
     "posture": Posture,
+    "elbow_angle": ElbowAngle,
 }
 
 

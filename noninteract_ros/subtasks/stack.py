@@ -42,6 +42,9 @@ class SubtaskStack:
         self.slices = _slices([subtask.dim for subtask in subtasks])
         self.value_slices = _slices([subtask.size for subtask in subtasks])
         self._stacked, self._stacked_rate = LastCall(_stack), LastCall(_stack)
+        self._bounded = [
+            task for task in self.subtasks if type(task).soundness is not Subtask.soundness
+        ]
         self._check_rank(team)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
@@ -52,6 +55,10 @@ class SubtaskStack:
             self._stacked(*(part.J for part in parts)),
             self._stacked_rate(*(part.J_rate for part in parts)),
         )
+
+    def soundness(self, state: TeamState) -> float:
+        """Least `Subtask.soundness` of all, 1 where none has places without a value."""
+        return min((task.soundness(state) for task in self._bounded), default=1.0)
 
     def difference(self, x: Array, x_d: Array) -> Array:
         """Error of stacked values towards others, shape (n,); see `Layout.difference`."""

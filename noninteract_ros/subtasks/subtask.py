@@ -38,6 +38,7 @@ class Subtask(ABC):
         elements: Names of the bodies or edges that its messages list, in order.
         axes: Axes, out of x, y and z, that each element has.
         rotates: Whether each element has a rotation.
+        angles: Whether positions are angles [rad]: those a whole turn apart are the same.
         frame: Orientation of the team that other subtasks can be seen from, or None; its
             `evaluate` returns one rotation with its differentials, see `parts.Rows`.
         mixing: How it mixes what each robot does, or None; see `mixing`.
@@ -49,6 +50,7 @@ class Subtask(ABC):
     elements: tuple[str, ...]
     axes: tuple[str, ...]
     rotates: bool = False
+    angles: bool = False
     frame: Part | None = None
     mixing: Mixing | None = None
 
@@ -56,7 +58,7 @@ class Subtask(ABC):
     def layout(self) -> Layout:
         """Which numbers of a value are positions and which are quaternions."""
         count = len(self.elements)
-        return Layout((len(self.axes),) * count, (self.rotates,) * count)
+        return Layout((len(self.axes),) * count, (self.rotates,) * count, (self.angles,) * count)
 
     @property
     def dim(self) -> int:
@@ -75,3 +77,11 @@ class Subtask(ABC):
     @abstractmethod
     def evaluate(self, state: TeamState) -> SubtaskState:
         """Value, Jacobian and Jacobian rate at a state of the team."""
+
+    def soundness(self, state: TeamState) -> float:
+        """How far the state is from places where the value is not defined: there 0, at most 1.
+
+        A Jacobian that grows beyond bounds there hides from the regularity of the stack; so the
+        law fades out by this measure, too.
+        """
+        return 1.0
