@@ -12,6 +12,9 @@ NODES = (
     "relative_planner",
     "controller",
     "operator_console",
+    "joy_operator",
+    "pose_operator",
+    "keyboard_operator",
     "recorder",
 )
 PROGRAMS = {node: f"{NAME}.nodes.{node}:main" for node in NODES}
@@ -33,6 +36,7 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", sorted(glob("config/*.yaml"))),
+        (f"share/{NAME}/config/devices", sorted(glob("config/devices/*.yaml"))),
         (f"share/{NAME}/launch", sorted(glob("launch/*.py"))),
         # pip puts entry points into bin/ only, while `ros2 run` looks into lib/<package>/.
         (f"lib/{NAME}", [f"scripts/{program}" for program in PROGRAMS]),

@@ -13,6 +13,12 @@ from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_of
 from noninteract_ros.operator.bilateral import BilateralLink
 from noninteract_ros.operator.haptic import HapticDevice, HapticSettings
+from noninteract_ros.operator.input_settings import (
+    JoySettings,
+    KeyboardSettings,
+    OperatorSettings,
+    TrackerSettings,
+)
 from noninteract_ros.operator.link_settings import LinkSettings
 from noninteract_ros.operator.planner import Formation, FormationPlanner, PlannerSettings
 from noninteract_ros.scenario_blocks import (
@@ -58,6 +64,10 @@ class Scenario:
         safety: Behaviour at singularities and joint limits.
         console: The operator's console, or None.
         tank: The energy account.
+        operator: What people's devices have in common, or None.
+        joy: Meaning of a gamepad's or space mouse's axes and buttons, or None.
+        tracker: A device that tells its pose, or None.
+        keyboard: Keys of a terminal, or None.
     """
 
     general: General
@@ -73,6 +83,10 @@ class Scenario:
     safety: SafetySettings
     console: ConsoleSettings | None
     tank: TankSettings
+    operator: OperatorSettings | None
+    joy: JoySettings | None
+    tracker: TrackerSettings | None
+    keyboard: KeyboardSettings | None
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "Scenario":
@@ -102,6 +116,10 @@ class Scenario:
             load_optional(SafetySettings, values, "safety") or SafetySettings(),
             load_optional(ConsoleSettings, values, "console"),
             load_optional(TankSettings, values, "tank") or TankSettings(),
+            load_optional(OperatorSettings, values, "operator"),
+            load_optional(JoySettings, values, "joy"),
+            load_optional(TrackerSettings, values, "tracker"),
+            load_optional(KeyboardSettings, values, "keyboard"),
         )
         scenario.check()
         return scenario
@@ -113,6 +131,8 @@ class Scenario:
         blocks += [("object", self.held), ("haptic", self.haptic), ("link", self.link)]
         blocks.append(("tank", self.tank))
         blocks += [("planner", self.planner), ("safety", self.safety), ("console", self.console)]
+        blocks += [("operator", self.operator), ("joy", self.joy), ("tracker", self.tracker)]
+        blocks += [("keyboard", self.keyboard)]
         blocks += [(f"planner.{name}", block) for name, block in self.formations.items()]
         for name, spec in self.subtasks.items():
             blocks += [(name, part) for part in (spec.kind, spec.impedance, spec.input)]

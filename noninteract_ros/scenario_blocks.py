@@ -17,7 +17,8 @@ from noninteract_ros.subtasks.registry import SubtaskBlock, kind_named
 from noninteract_ros.team.assembler import PREDICTIONS
 from noninteract_ros.team.registry import ROBOT_MODELS, RobotBlock
 
-OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console", "tank")
+DEVICES = ("operator", "joy", "tracker", "keyboard")
+OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console", "tank", *DEVICES)
 LISTINGS = ("robots", "subtasks", "pushes", "surroundings")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # What may be a part of a topic's name.
 # Every ROS node has these of its own.

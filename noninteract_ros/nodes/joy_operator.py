@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Program `joy_operator`: a gamepad or space mouse that leads a subtask by rates."""
+
+import sys
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import Joy
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.reference import Reference
+from noninteract_ros.nodes.operator_node import OperatorNode
+from noninteract_ros.nodes.program import run_program
+from noninteract_ros.operator.input_settings import JoySettings
+from noninteract_ros.operator.joy_mapping import JoyMapping
+
+
+class JoyOperator(OperatorNode):
+    """Leads while the enable button is held, or without one while the device is deflected."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("joy_operator", **kwargs)
+        settings = self.scenario.joy or JoySettings()
+        self._mapping = JoyMapping(settings)
+        self._stick: Array = np.zeros(6)
+        self.subscribe(Joy, settings.topic, self._on_joy)
+
+    def _on_joy(self, message: Joy) -> None:
+        stick, held = self._mapping.read(message.axes, message.buttons)
+        self._stick = stick
+        self.dead_man.note(time.monotonic(), held)
+
+    def lead(self, now: float, desired: Reference) -> None:
+        """A rate in proportion to the deflection."""
+        self.say_rate(self.input.rate(self._stick, desired))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return run_program(JoyOperator, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
