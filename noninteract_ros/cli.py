@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The command line: `noninteract demo | report | check | repair | bench`."""
+"""The command line: `noninteract demo | report | check | describe | repair | bench`."""
 
 import json
 import os
@@ -222,6 +222,25 @@ def bench(
     console.print(measures.table(figures))
     if json_file is not None:
         json_file.write_text(json.dumps(figures, indent=2) + "\n")
+    return 0
+
+
+@app.command()
+def describe(
+    scenario: Annotated[str, typer.Argument(help="Name or file of a scenario.")],
+    out: Annotated[Path, typer.Option(help="File to write.")],
+    timeout: Annotated[float, typer.Option(help="Time to wait for descriptions [s].")] = 10.0,
+) -> int:
+    """Write a scenario with the robots' descriptions in place of the topics they come on."""
+    from noninteract_ros.nodes.describe import described
+    from noninteract_ros.nodes.parameter_files import dump
+    from noninteract_ros.scenario_file import find_scenario, load_scenario, read_parameters
+
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    values = described(read_parameters(find_scenario(scenario)), timeout)
+    out.write_text(dump({"/**": {"ros__parameters": values}}))
+    load_scenario(out)
+    console.print(f"{out}: {', '.join(load_scenario(out).robots)}")
     return 0
 
 

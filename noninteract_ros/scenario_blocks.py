@@ -16,6 +16,7 @@ from noninteract_ros.simulation.environment import SURROUNDINGS, SurroundingBloc
 from noninteract_ros.subtasks.registry import SubtaskBlock, kind_named
 from noninteract_ros.team.assembler import PREDICTIONS
 from noninteract_ros.team.registry import ROBOT_MODELS, RobotBlock
+from noninteract_ros.team.urdf import TOPIC
 
 DEVICES = ("operator", "joy", "tracker", "keyboard")
 OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console", "tank", *DEVICES)
@@ -128,6 +129,18 @@ def load_robot(name: str, values: Mapping[str, Any]) -> RobotBlock:
     if not isinstance(model, str) or model not in ROBOT_MODELS:
         raise ScenarioError(f"{name}.model", repr(model), one_of(ROBOT_MODELS, str(model)))
     return load(ROBOT_MODELS[model], values, name)
+
+
+def description_topics(values: Mapping[str, Any]) -> dict[str, str]:
+    """Topics of the robots whose descriptions have not come yet, by robot."""
+    blocks = {name: values.get(name) for name in values.get("robots", ())}
+    return {
+        name: block["urdf"].removeprefix(TOPIC)
+        for name, block in blocks.items()
+        if isinstance(block, Mapping)
+        and str(block.get("urdf", "")).startswith(TOPIC)
+        and not block.get("urdf_text")
+    }
 
 
 def load_surrounding(name: str, values: Mapping[str, Any]) -> SurroundingBlock:

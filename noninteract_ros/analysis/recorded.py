@@ -15,6 +15,7 @@ from noninteract_ros.analysis.series import JointSeries, TrajectorySeries
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import RecordingError, ScenarioError
 from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario_blocks import description_topics
 from noninteract_ros.scenario_file import nest
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.robot import AXES
@@ -215,7 +216,8 @@ def scenario_of(run: Run) -> Scenario:
     if run.scenario is None:
         raise RecordingError(f"{run.path}: holds no scenario, so that it cannot be analysed")
     try:
-        return Scenario.from_dict(_parameters(yaml.safe_load(run.scenario)))
+        values = _parameters(yaml.safe_load(run.scenario))
+        return Scenario.from_dict(_described(run, values))
     except (ScenarioError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"{run.path}: its scenario is wrong: {reason}") from error
@@ -226,6 +228,16 @@ def _parameters(content: Any) -> Mapping[str, Any]:
     for block in content.values():
         merged.update(block["ros__parameters"])
     return nest(merged)
+
+
+def _described(run: Run, values: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The same scenario with the robots' descriptions that came on topics."""
+    described = dict(values)
+    for robot, topic in description_topics(values).items():
+        for message in run.messages(topic):
+            described[robot] = {**described[robot], "urdf_text": message.data}
+            break  # One that comes later is refused by the programs.
+    return described
 
 
 def _coordinates(task: Subtask, series: TrajectorySeries, linear: Array, turning: Array) -> Array:

@@ -202,13 +202,18 @@ class Controller(ScenarioNode):
     def turn(self) -> None:
         """Wall time: does what has come in, and answers the newest state unless it is answered."""
         self._link.poll()
-        self._keep_still(self._link.problem())
+        self._keep_still(self.descriptions.problem or self._link.problem())
         state = self._state
         if state is not None:
             self._now = seconds(state[0])
         self._work_off()
         if state is not None and self._answered != state[0]:
             self._answer(*state)
+
+    def on_description_changed(self) -> None:
+        """The law has another model than the robots: they are held still until a restart."""
+        if self.lockstep:
+            self._keep_still(self.descriptions.problem)
 
     def _keep_still(self, problem: str) -> None:
         """Holds the team still, as a stop does, while there is a problem that may go by itself."""

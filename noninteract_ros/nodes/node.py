@@ -14,10 +14,11 @@ from rclpy.clock import Clock, ClockType
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
 from noninteract_ros.errors import InputError
+from noninteract_ros.nodes.descriptions import Descriptions
 from noninteract_ros.nodes.messages import Level, to_diagnostics, to_status
 from noninteract_ros.nodes.program import until_shutdown
 from noninteract_ros.scenario import Scenario
@@ -26,8 +27,6 @@ from noninteract_ros.scenario_file import nest
 NAMESPACE = "team"
 # Reliable, and so deep that a reader who is kept waiting, as a recorder may be, misses no tick.
 LOOP_QOS = QoSProfile(depth=1000)
-# What is said once and holds: who comes later hears it too.
-LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DIAGNOSTICS_PERIOD = 0.5
 STEADY = Clock(clock_type=ClockType.STEADY_TIME)
 LOG_PERIOD = 2.0
@@ -50,6 +49,12 @@ class ScenarioNode(Node):
 
     Raises:
         ScenarioError: The parameters are no valid scenario.
+
+    Attributes:
+        values: The scenario, nested.
+        scenario: The scenario, checked.
+        lockstep: Whether the team waits for its commands.
+        descriptions: URDFs that came on topics.
     """
 
     LIVE = False
@@ -58,13 +63,15 @@ class ScenarioNode(Node):
         kwargs.setdefault("namespace", NAMESPACE)
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         given = {key: item.value for key, item in self.get_parameters_by_prefix("").items()}
-        self.values = nest(given)
+        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.descriptions = Descriptions(self, nest(given), self.on_description_changed)
+        # Nothing of a node can be built before the robots are known, so it is waited here.
+        self._refused: Counter[str] = Counter()
+        self._last_refusal = "none"
+        self.values = self.descriptions.wait(self._tell_of_waiting)
         self.scenario = Scenario.from_dict(self.values)
         self._declare()
         self.lockstep = self.scenario.general.lockstep
-        self._refused: Counter[str] = Counter()
-        self._last_refusal = "none"
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.every(DIAGNOSTICS_PERIOD, self.publish_diagnostics)
 
     def _declare(self) -> None:
@@ -91,6 +98,17 @@ class ScenarioNode(Node):
     def publish_diagnostics(self) -> None:
         """Says how the node is."""
         level, text, values = self.status()
+        if problem := self.descriptions.problem:
+            level, text = Level.ERROR, text if problem in text else f"{problem}; {text}"
+        self._tell(level, text, values)
+
+    def on_description_changed(self) -> None:
+        """A robot's description is another one than that which the node was built from."""
+
+    def _tell_of_waiting(self, text: str, refused: bool) -> None:
+        self._tell(Level.ERROR if refused else Level.WARN, text, {})
+
+    def _tell(self, level: Level, text: str, values: dict[str, object]) -> None:
         matched = [(item.topic_name, item.get_subscription_count()) for item in self.publishers]
         values["subscribers"] = ", ".join(f"{topic} {count}" for topic, count in matched)
         if refused := dict(self._refused):  # The loop may refuse something meanwhile.

@@ -26,6 +26,7 @@ from noninteract_ros.nodes.parameter_files import files_of
 from noninteract_ros.nodes.program import StopSignal, init
 
 GLOBAL_TOPICS = ("/diagnostics", "/clock")
+DESCRIPTION = "/robot_description"
 POLL_PERIOD = 0.004
 FLUSH_PERIOD = 0.5
 STATUS_PERIOD = 1.0
@@ -161,6 +162,8 @@ class RecorderNode(Node):
             ours = topic in GLOBAL_TOPICS or topic.startswith(
                 f"{self.get_namespace().rstrip('/')}/"
             )
+            # Without what the robots are, nobody can make anything of a run.
+            ours = ours or topic.endswith(DESCRIPTION)
             if ours and topic not in self._feeds and topic not in self._skipped:
                 self._calm_scans = 0
                 self._subscribe(topic, type_name)

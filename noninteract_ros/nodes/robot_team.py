@@ -19,9 +19,10 @@ from noninteract_ros.control.inputs import HORIZON
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes import messages
 from noninteract_ros.nodes.body_poses import BodyPoses
+from noninteract_ros.nodes.descriptions import LATCHED_QOS
 from noninteract_ros.nodes.lockstep import StampOrder
 from noninteract_ros.nodes.messages import Level
-from noninteract_ros.nodes.node import LATCHED_QOS, LOOP_QOS, ScenarioNode, Ticker
+from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 from noninteract_ros.nodes.robot_ports import RobotPorts
 
@@ -78,6 +79,8 @@ class RobotTeam(ScenarioNode):
     def _describe(self) -> None:
         """Publishes the robots' URDFs, for whoever draws them, now or later."""
         for name, block in self.scenario.robots.items():
+            if self.descriptions.heard_on(f"{name}/robot_description"):
+                continue  # Whoever publishes it there goes on doing so.
             publisher = self.create_publisher(String, f"{name}/robot_description", LATCHED_QOS)
             publisher.publish(String(data=block.description(name)))
 

@@ -16,6 +16,7 @@ from noninteract_ros.team.robot import Robot, position_limits
 from noninteract_ros.team.urdf_files import read_urdf
 
 CLASH = " (joint)"
+TOPIC = "topic:"
 JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic")
 
 
@@ -31,7 +32,9 @@ class UrdfRobot(ArmSettings):
     tool_frame: str = key("Link that works; it has the tool point")
     model: str = key("Kind of robot", "urdf", choices=("urdf",))
     urdf: str = key(
-        "URDF file: a path, package://<package>/<path>, or example-robot-data/<path>", ""
+        "URDF file: a path, package://<package>/<path>, example-robot-data/<path>; or"
+        " topic:<name>, where a robot_description is published",
+        "",
     )
     urdf_text: str = key("The URDF itself, such as a robot_description, instead of a file", "")
     locked_joints: tuple[str, ...] = key("Joints that do not move", ())
@@ -45,7 +48,7 @@ class UrdfRobot(ArmSettings):
         Raises:
             ScenarioError: The URDF cannot be used, or a key does not fit it.
         """
-        if bool(self.urdf) == bool(self.urdf_text):
+        if bool(self.urdf) == bool(self.urdf_text) and not self._on_topic:
             found = "both" if self.urdf else "neither"
             raise ScenarioError(
                 join(name, "urdf"), f"{found} of urdf and urdf_text", "one of them"
@@ -71,9 +74,19 @@ class UrdfRobot(ArmSettings):
         """The URDF as it was given, in the frame of its base.
 
         Raises:
-            ScenarioError: The file cannot be read.
+            ScenarioError: The file cannot be read, or the topic's text is not in `urdf_text`.
         """
-        return read_urdf(join(name, "urdf"), self.urdf) if self.urdf else self.urdf_text
+        path = join(name, "urdf")
+        if not self._on_topic:
+            return read_urdf(path, self.urdf) if self.urdf else self.urdf_text
+        if not self.urdf_text:
+            allowed = "a running program, which waits for it; or what `noninteract describe` makes"
+            raise ScenarioError(path, repr(self.urdf), allowed)
+        return self.urdf_text
+
+    @property
+    def _on_topic(self) -> bool:
+        return self.urdf.startswith(TOPIC)
 
     def _locked_configuration(self, name: str, model: pin.Model) -> np.ndarray:
         """Configuration of all joints in which the locked ones are where they are to be."""

@@ -18,10 +18,12 @@ from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
+from std_msgs.msg import String
 
 from noninteract_ros.analysis.repair import repair
 from noninteract_ros.analysis.run import Run
 from noninteract_ros.errors import RecordingError
+from noninteract_ros.nodes.descriptions import LATCHED_QOS
 from noninteract_ros.nodes.feed import SequenceCheck
 from noninteract_ros.nodes.recorder import RecorderNode
 
@@ -166,6 +168,7 @@ def test_what_cannot_be_recorded_is_said_in_one_line(
 
 FULL_DISK = """
 import resource, sys
+from noninteract_ros.nodes.descriptions import LATCHED_QOS
 from noninteract_ros.nodes.recorder import main
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
@@ -256,6 +259,17 @@ def test_what_was_said_once_before_the_recorder_is_kept(ros: Any, tmp_path: Path
     poll_until(recorder, lambda: recorder.writer.topics == 2)
     recorder.finish()
     assert "/team/latched" in Run.open(tmp_path).topics
+
+
+def test_descriptions_are_recorded_wherever_they_lie(ros: Any, tmp_path: Path) -> None:
+    """What the robots are belongs to a run, whoever says it."""
+    node, make = ros
+    node.create_publisher(String, "/arm/robot_description", LATCHED_QOS).publish(String(data="x"))
+    recorder = make(tmp_path / "run.mcap")
+    poll_until(recorder, lambda: recorder.writer.topics == 2)
+    recorder.finish()
+    found = [message.data for message in Run.open(tmp_path).messages("/arm/robot_description")]
+    assert found == ["x"]
 
 
 def test_an_unknown_type_is_left_out(ros: Any, tmp_path: Path) -> None:
