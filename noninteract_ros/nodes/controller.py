@@ -29,6 +29,8 @@ from noninteract_ros.nodes.team_link import TeamLink
 from noninteract_ros.nodes.telemetry import Telemetry
 
 WATCH_PERIOD = 0.1  # [s] how often absent lockstep sources are looked for
+BRAKE_TIME = 2.0  # [s] given to effort-controlled robots to come to rest when the program ends
+AT_REST = 1e-3  # [m/s or rad/s]
 WAIT_SHOWN = 0.3  # [s] of waiting for something that is worth a word
 
 
@@ -195,9 +197,27 @@ class Controller(ScenarioNode):
     def loop(self) -> None:
         """Wall time: answers the newest state once per period."""
         ticker = Ticker(self.scenario.general.rate)
-        while self.context.ok():
+        while self.context.ok() and not self.told_to_stop():
             ticker.wait()
             self.turn()
+        if self.context.ok() and self._link.efforts:
+            self._end(ticker)
+
+    def _end(self, ticker: Ticker) -> None:
+        """Brakes the team, for effort controllers would hold the last torques for ever."""
+        self._post(self.core.stop)
+        end = time.monotonic() + BRAKE_TIME
+        while self._state is not None and np.abs(self._state[2]).max() > AT_REST:
+            if time.monotonic() > end:
+                break
+            ticker.wait()
+            self.turn()
+        self._link.efforts.end()
+
+    @property
+    def has_last_words(self) -> bool:
+        """Whether it has robots to brake before it ends."""
+        return self.has_loop and bool(self._link.efforts)
 
     def turn(self) -> None:
         """Wall time: does what has come in, and answers the newest state unless it is answered."""
@@ -220,10 +240,8 @@ class Controller(ScenarioNode):
         if problem == self._chronicle.problem:
             return
         self._chronicle.problem = problem
-        if problem:
-            self.get_logger().error(f"holding the team still: {problem}")
-        else:
-            self.get_logger().info("no longer holding the team still")
+        text = f"holding the team still: {problem}" if problem else "the team is free again"
+        (self.get_logger().error if problem else self.get_logger().info)(text)
         if problem and not self.core.mode.stopped:
             self.core.stop()
         elif not problem and not self._stop_asked:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from rclpy.duration import Duration
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from noninteract_ros.arrays import Array
@@ -16,6 +17,7 @@ from noninteract_ros.nodes.node import ScenarioNode
 from noninteract_ros.team.team import Team
 
 DIGITS = 19
+END_TIMEOUT = Duration(seconds=0.2)
 LABEL = "state stamp {stamp:0" + str(DIGITS) + "d} ns"
 STAMP = re.compile(r"state stamp (\d+) ns")
 
@@ -126,10 +128,17 @@ class EffortOutputs:
         self._publish(stamp, gravity + share * (torque - gravity), gravity)
 
     def end(self) -> None:
-        """The last word: gravity alone."""
-        if self._last is not None:
-            stamp, _, gravity = self._last
-            self._publish(stamp, gravity, gravity)
+        """The last word: gravity alone, waited for until it is heard."""
+        if self._last is None:
+            return
+        stamp, _, gravity = self._last
+        self._publish(stamp, gravity, gravity)
+        for output in self._outputs:
+            output.publisher.wait_for_all_acked(END_TIMEOUT)
+
+    def __bool__(self) -> bool:
+        """Whether any robot has an effort controller of its own."""
+        return bool(self._outputs)
 
     def _publish(self, stamp: int, torque: Array, gravity: Array) -> None:
         for output in self._outputs:

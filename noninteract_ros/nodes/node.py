@@ -55,6 +55,7 @@ class ScenarioNode(Node):
         scenario: The scenario, checked.
         lockstep: Whether the team waits for its commands.
         descriptions: URDFs that came on topics.
+        told_to_stop: Whether the program was, asked by a loop with last words.
     """
 
     LIVE = False
@@ -66,6 +67,7 @@ class ScenarioNode(Node):
         self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.descriptions = Descriptions(self, nest(given), self.on_description_changed)
         # Nothing of a node can be built before the robots are known, so it is waited here.
+        self.told_to_stop: Callable[[], bool] = lambda: False
         self._refused: Counter[str] = Counter()
         self._last_refusal = "none"
         self.values = self.descriptions.wait(self._tell_of_waiting)
@@ -162,8 +164,13 @@ class ScenarioNode(Node):
     def loop(self) -> None:
         """What the main thread does where it has a loop."""
 
+    @property
+    def has_last_words(self) -> bool:
+        """Whether the loop has something to say after it was told to stop."""
+        return False
+
     def run(self) -> None:
-        """Runs until the context is shut down."""
+        """Runs until the context is shut down; with last words, until it is told to stop."""
         executor = EventsExecutor(context=self.context)
         executor.add_node(self)
         if self.has_loop:

@@ -12,7 +12,7 @@ from typing import Protocol
 
 import rclpy
 from rclpy.executors import ExternalShutdownException
-from rclpy.signals import SignalHandlerOptions
+from rclpy.signals import SignalHandlerOptions, uninstall_signal_handlers
 from rclpy.utilities import remove_ros_args
 
 from noninteract_ros.errors import ScenarioError
@@ -20,10 +20,20 @@ from noninteract_ros.nodes.parameter_files import origin_of_key, rewrite
 
 
 class Runnable(Protocol):
-    """A node that a program consists of."""
+    """A node that a program consists of.
+
+    Attributes:
+        told_to_stop: Whether it was, asked by a node with last words.
+    """
+
+    told_to_stop: Callable[[], bool]
+
+    @property
+    def has_last_words(self) -> bool:
+        """Whether it has something to say before the context may be shut down."""
 
     def run(self) -> None:
-        """Runs until the context is shut down."""
+        """Runs until the context is shut down; with last words, until it is told to stop."""
 
     def destroy_node(self) -> None:
         """Ends the node."""
@@ -96,6 +106,9 @@ def run_program(make: Callable[[], Runnable], arguments: Sequence[str] | None) -
             node = make()
             # The loop must not wait for the executor's thread for long.
             sys.setswitchinterval(0.0005)
+            if node.has_last_words:  # ROS would shut the context down before they are said.
+                uninstall_signal_handlers()
+                node.told_to_stop = lambda: stop.came
             if not stop.came:
                 node.run()
     except ScenarioError as error:

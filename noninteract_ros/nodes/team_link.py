@@ -21,13 +21,16 @@ class TeamLink:
         node: The controller's node.
         team: The robots.
         take: Takes a state of the team: stamp [ns], joint positions and velocities (n,).
+
+    Attributes:
+        efforts: The robots' own effort controllers.
     """
 
     def __init__(self, node: ScenarioNode, team: Team, take: TakeState) -> None:
         self._take = take
         self._codec = JointStateCodec(team.joint_names, required=("position", "velocity"))
         self._publish_to = node.create_publisher(JointState, "joint_commands", LOOP_QOS)
-        self._efforts = EffortOutputs(node, team)
+        self.efforts = EffortOutputs(node, team)
         self._last = b""
         self._robots: RobotStates | None = None
         if node.scenario.own_states:
@@ -45,24 +48,20 @@ class TeamLink:
         """Tells the torques that answer the state with a stamp [ns]."""
         if self._robots is not None:
             self._robots.asked = tick.torque
-        self._efforts.send(stamp, tick.torque, tick.state.g)
+        self.efforts.send(stamp, tick.torque, tick.state.g)
         self._last = self._codec.encode(stamp, effort=tick.torque)
         self._publish_to.publish(self._last)
 
     def repeat(self) -> None:
         """Tells the last answer again."""
-        self._efforts.repeat()
+        self.efforts.repeat()
         self._publish_to.publish(self._last)
 
     def poll(self) -> None:
         """Wall time: takes what the robots have told; without states, lets torques fade."""
         if self._robots is not None:
             self._robots.poll()
-        self._efforts.rest()
-
-    def end(self) -> None:
-        """The last torques before the program ends: gravity alone."""
-        self._efforts.end()
+        self.efforts.rest()
 
     def problem(self) -> str:
         """Why the team has to be held still, or an empty text."""

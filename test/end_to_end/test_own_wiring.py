@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots with topics of their own, as programs of their own: the same motion as in one program."""
 
+import signal
 from typing import Any
 
 import numpy as np
 import pytest
-from harness import Ear, Ros, go, merged, until
+from harness import DEADLINE, Ear, Ros, go, merged, until
 from programs import Programs
 from repository import ROOT
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
@@ -37,20 +38,24 @@ def test_the_wiring_changes_nothing_in_lockstep(ros: Ros, programs: Programs) ->
     np.testing.assert_allclose(effort[1:], expected.torque, atol=1e-9)
 
 
+# Slow and soft enough for any machine.
+WALL: dict[str, Any] = {
+    "lockstep": False,
+    "rate": 200.0,
+    "telemetry_rate": 50.0,
+    "max_state_skew": 0.3,
+    "command_timeout": 0.5,
+    "state_timeout": 1.0,
+    "right": {"joint_states_rate": 100.0},
+    "cooperative": {"stiffness": [40.0], "damping": [40.0], "takeover": "shaped"},
+    "relative": {"stiffness": [60.0], "damping": [30.0], "takeover": "shaped"},
+    "haptic": {"motion": "still", "centre": [0.0, 0.5], "start_time": 0.0, "update_rate": 50.0},
+}
+
+
 def test_in_wall_time_they_reach_and_hold_a_place(ros: Ros, programs: Programs) -> None:
     """Two arms that speak at different times are led; without a controller each brakes."""
-    values = own_robots(
-        lockstep=False,
-        rate=200.0,
-        telemetry_rate=50.0,
-        max_state_skew=0.3,
-        command_timeout=0.5,
-        state_timeout=1.0,
-        right={"joint_states_rate": 100.0},
-        cooperative={"stiffness": [40.0], "damping": [40.0], "takeover": "shaped"},
-        relative={"stiffness": [60.0], "damping": [30.0], "takeover": "shaped"},
-        haptic={"motion": "still", "centre": [0.0, 0.5], "start_time": 0.0, "update_rate": 50.0},
-    )
+    values = own_robots(**WALL)
     ear = ros.ear(values)
     team = Scenario.from_dict(values).build_team()
 
@@ -62,6 +67,31 @@ def test_in_wall_time_they_reach_and_hold_a_place(ros: Ros, programs: Programs) 
     until(lambda: np.abs(middle() - [0.0, 0.5]).max() < 0.01, "the place")
     programs.kill("controller")
     until(ear.says("robot_team", "braking: no fresh command"), "the team brakes")
+
+
+def test_a_controller_that_is_ended_brakes_the_team_first(ros: Ros, programs: Programs) -> None:
+    """Its last words are gravity alone, since effort controllers hold them for ever."""
+    circle = {"motion": "circle", "centre": [0.0, 0.6], "start_time": 0.0, "ramp_time": 1.0}
+    values = own_robots(**merged(WALL, {"haptic": circle}))
+    ear = ros.ear(values)
+    heard: dict[str, list[float]] = {}
+    for side in ("left", "right"):
+
+        def note(message: Float64MultiArray, side: str = side) -> None:
+            heard[side] = list(message.data)
+
+        topic = f"{side}_effort_controller/commands"
+        ros.probe.create_subscription(Float64MultiArray, topic, note, 10)
+    programs.start_all(NAMES, values, ear)
+    until(lambda: ear.states and np.abs(ear.newest().velocity).max() > 0.1, "the team moves")
+    controller = programs.running["controller"]
+    controller.send_signal(signal.SIGINT)
+    assert controller.wait(DEADLINE) == 0, programs.log("controller")
+    last = ear.newest()
+    assert np.abs(last.velocity).max() < 0.02
+    gravity = Scenario.from_dict(values).build_team().gravity(last.position)
+    until(lambda: heard["left"] == [0.0, 0.0], "that the left arm is left to its own gravity")
+    np.testing.assert_allclose(heard["right"], gravity[2:], rtol=0.01)
 
 
 @pytest.mark.parametrize("label", ["", "state stamp 0000000000000000007 ns"])
