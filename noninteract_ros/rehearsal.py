@@ -73,6 +73,10 @@ class Rehearsal:
         for _, _, narrator in self._speakers:
             narrator.begin(0.0)
         self._feedback: Array | None = None
+        general = scenario.general
+        self._telling = max(1, round(rate / general.telemetry_rate))
+        self._sensed = np.array([name in general.force_sensors for name in self.team.names])
+        self._wrenches = np.zeros((len(self.team.names), 6))
 
     @property
     def q(self) -> Array:
@@ -89,7 +93,10 @@ class Rehearsal:
             for stamp, reference in narrator.speak(now, feedback):
                 if reference is not None:
                     heard.receive(stamp / 1e9, reference, now)
-        tick = self.controller.step(now, self.q, self.simulation.v)
+        if self.controller.feels and self.simulation.tick % self._telling == 0:
+            self._wrenches = self.simulation.external_wrenches() * self._sensed[:, None]
+        wrenches = self._wrenches
+        tick = self.controller.step(now, self.q, self.simulation.v, wrenches=wrenches)
         if self._felt:
             part = self.stack.slices[self.stack.names.index(self._felt)]
             self._feedback = tick.feedback[part]

@@ -213,6 +213,7 @@ class Scenario:
             self.general.state_timeout,
             self.safety,
             self.tank,
+            measured=bool(self.general.force_sensors),
         )
 
     def build_simulation(self, team: Team, stack: SubtaskStack) -> TeamSimulation:

@@ -40,7 +40,6 @@ def _natural(dynamics: TaskDynamics, v: Array, error: TaskError, gains: Impedanc
 
 
 PLAIN_FORMS: dict[str, PlainForm] = {
-    "energy_gated": _corrected,
     "noninteracting": _corrected,
     "natural": _natural,
     "paper": _printed,

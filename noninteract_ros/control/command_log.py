@@ -10,7 +10,7 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.control.decoupling import TaskDynamics
 
 REMEMBERED = 50  # commands among which the torque that a team reports is looked for
-MATCH = 1e-6  # relative to the largest torque: also drives that report in single precision
+MATCH = 0.02  # relative to the largest torque: drives that report what they measure
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +49,10 @@ class CommandLog:
         self._commands.append(command)
 
     def applied(self, torque: Array | None) -> Command | None:
-        """The newest command with the torque that a team reports; None before the first one.
+        """The command nearest to the torque that a team reports; None before the first one.
 
-        Without a report it is the last one. Where no command has this torque, brakes or drives
-        have given it: all of it beyond gravity then counts as the impedance's.
+        Without a report it is the last one. Where no command is near this torque, brakes or
+        drives have given it: all of it beyond gravity then counts as the impedance's.
 
         Args:
             torque: What the team reports, shape (n,) [N or N m], or None.
@@ -63,12 +63,17 @@ class CommandLog:
         if torque is None:
             self._commands.clear()
             return newest
+        nearest, distance = newest, np.inf
         for command in reversed(self._commands):
-            near = MATCH * (1.0 + np.abs(command.torque).max())
-            if (np.abs(command.torque - torque) <= near).all():
-                while self._commands[0] is not command:  # Their time is over.
-                    self._commands.popleft()
-                return command
+            away = float(np.abs(command.torque - torque).max())
+            if away < distance:
+                nearest, distance = command, away
+            if away == 0.0:
+                break
+        if distance <= MATCH * (1.0 + np.abs(nearest.torque).max()):
+            while self._commands[0] is not nearest:  # Their time is over.
+                self._commands.popleft()
+            return nearest
         dynamics = newest.dynamics
         none = np.zeros_like(torque)
         force = dynamics.force_of(torque - dynamics.g)

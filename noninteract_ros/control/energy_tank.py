@@ -61,6 +61,10 @@ class TankSettings:
         live=True,
     )
 
+    observer_gain: float = key(
+        "Bandwidth of the momentum observer, where no force is measured [1/s]", 50.0, positive=True
+    )
+
     def check(self) -> None:
         """Refuses levels that could never be reached or that would let sigma breathe.
 

@@ -2,7 +2,7 @@
 """Impedance of the subtasks: potentials, damping and desired inertia of (29) and (30)."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -39,6 +39,22 @@ class ImpedanceSettings:
     max_force: tuple[float, ...] = key(
         "Bound of a saturating potential's force [N; N m]", (), positive=True, live=True
     )
+    force: tuple[float, ...] = key(
+        "Force that the subtask is to press with, beyond its impedance [N; N m]", (), live=True
+    )
+    force_gain: tuple[float, ...] = key(
+        "Rate at which the force that is felt is regulated to it [1/s]; by default not at all",
+        (),
+        minimum=0.0,
+        live=True,
+    )
+    force_bound: tuple[float, ...] = key(
+        "Bound of what regulation adds to the force [N; N m]", (10.0,), positive=True, live=True
+    )
+
+
+def _none() -> Array:
+    return np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +69,9 @@ class Impedance:
         rotations: Coordinates of the rotations, shape (r, 3); None without any. The three of one
             have the same stiffness and bound, and a potential of the angle |e|: `Layout` proves
             that its gradient is exact.
+        goal: Force to press with, shape (n,) [N]; empty without any.
+        goal_gain: Rates of its regulation, shape (n,) [1/s].
+        goal_bound: Bounds of what regulation adds, shape (n,) [N].
     """
 
     stiffness: Array
@@ -60,6 +79,14 @@ class Impedance:
     max_force: Array
     inertias: tuple[Array | None, ...]
     rotations: Array | None = None
+    goal: Array = field(default_factory=_none)
+    goal_gain: Array = field(default_factory=_none)
+    goal_bound: Array = field(default_factory=_none)
+
+    @property
+    def has_goal(self) -> bool:
+        """Whether a subtask is to press."""
+        return bool(self.goal.any() or self.goal_gain.any())
 
     def force(self, e: Array) -> Array:
         """h(e), the exact gradient of the potential, shape (n,) [N; N m]."""
@@ -100,7 +127,15 @@ def stack_impedance(
             spread(task, "inertia", item.inertia) if item.inertia else None for task, item in pairs
         ),
         _rotations(subtasks),
+        *(
+            np.concatenate([_or_zero(task, name, getattr(item, name)) for task, item in pairs])
+            for name in ("force", "force_gain", "force_bound")
+        ),
     )
+
+
+def _or_zero(subtask: Subtask, name: str, values: Sequence[float]) -> Array:
+    return spread(subtask, name, values) if values else np.zeros(subtask.dim)
 
 
 def _rotations(subtasks: Sequence[Subtask]) -> Array | None:

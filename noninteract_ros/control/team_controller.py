@@ -13,15 +13,18 @@ from noninteract_ros.control.energy import Energy, energy
 from noninteract_ros.control.energy_gate import EnergyGate, Moment
 from noninteract_ros.control.energy_tank import TankSettings
 from noninteract_ros.control.fade import Fade
+from noninteract_ros.control.force_goal import ForceGoals
 from noninteract_ros.control.gated_law import decoupling, gated_acceleration, without_law
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
 from noninteract_ros.control.joint_safety import JointSafety, SafetyReport
+from noninteract_ros.control.outside import Outside
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.singularity import SingularityGuard, best_regularity
 from noninteract_ros.control.structure import Structure
 from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
 from noninteract_ros.control.team_view import DenseView, Seen, TeamView
 from noninteract_ros.control.tick import Mode, Tick
+from noninteract_ros.control.waiting_springs import WaitingSprings
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
@@ -42,6 +45,8 @@ class TeamController:
         state_timeout: Gap between states after which every subtask starts anew [s].
         safety: Behaviour at singularities and joint limits.
         tank: Capacity, levels and rates of the energy account.
+        measured: Whether wrenches on the tools will be given; else a momentum observer estimates
+            what acts from outside.
     """
 
     def __init__(
@@ -56,6 +61,7 @@ class TeamController:
         state_timeout: float = 0.2,
         safety: SafetySettings = DEFAULT_SAFETY,
         tank: TankSettings = DEFAULT_TANK,
+        measured: bool = True,
     ) -> None:
         self.team, self.stack = team, stack
         self._settings = list(impedances)
@@ -69,6 +75,8 @@ class TeamController:
         self._fade = Fade(team.n, transition_time)
         self._continuity = Continuity(team, state_timeout)
         self.gate = EnergyGate(team, stack, tank)
+        self.outside = Outside(team, measured, tank.observer_gain)
+        self._springs, self._goals = WaitingSprings(transition_time), ForceGoals(team.n)
         self._view: TeamView = Structure.of(team, stack) or DenseView(team, stack)
         self._guard = SingularityGuard(team, safety, best_regularity(team, stack))
         self._safety = JointSafety(team, safety)
@@ -92,8 +100,22 @@ class TeamController:
         """
         changed = list(self._settings)
         changed[self.stack.names.index(subtask)] = settings
-        self._change(replace(self._mode, impedance=stack_impedance(self.stack.subtasks, changed)))
+        impedance = stack_impedance(self.stack.subtasks, changed)
+        self._springs.forget()
+        if self._mode.law == "energy_gated":
+            impedance = self._springs.begin(self._mode.impedance, impedance)
+        self._change(replace(self._mode, impedance=impedance))
         self._settings = changed
+
+    @property
+    def feels(self) -> bool:
+        """Whether a force is regulated, so that each step needs to know the external one."""
+        return bool(self._mode.impedance.goal_gain.any())
+
+    @property
+    def springs_waiting(self) -> float | None:
+        """Progress of a change of stiffness that waits for energy, 0 to 1; None without any."""
+        return self._springs.waiting
 
     def set_authority(self, subtask: str, authority: str) -> None:
         """Hands one subtask to another source without a bump."""
@@ -114,6 +136,8 @@ class TeamController:
         self._continuity.forget()
         self._fade.forget()
         self.gate.restart()
+        self.outside.reset()
+        self._goals.forget()
         self._guard.reset()
         self._safety.reset()
         for item in self.inputs.values():
@@ -123,7 +147,14 @@ class TeamController:
         self._left = self._left or self._mode
         self._mode = mode
 
-    def step(self, now: float, q: Array, v: Array, applied: Array | None = None) -> Tick:
+    def step(
+        self,
+        now: float,
+        q: Array,
+        v: Array,
+        applied: Array | None = None,
+        wrenches: Array | None = None,
+    ) -> Tick:
         """Torque for the time from `now` to the next tick.
 
         Args:
@@ -132,6 +163,7 @@ class TeamController:
             v: Velocity, shape (n,).
             applied: Torque that the team reports to have had until now, shape (n,); None, if it
                 was the last one that was asked for.
+            wrenches: On the tools, as far as they are measured, shape (N, 6) [N, N m].
         """
         seen = self._view.evaluate(q, v, self._mode.impedance.inertias)
         restarted = self._continuity.broken(now, q, v)
@@ -143,6 +175,8 @@ class TeamController:
             self._rest_at(seen.task.x)
         if restarted:
             self._guard.reset()
+            self._goals.forget()
+            self.outside.reset()
             self.gate.pause()
         led = tuple(
             item.resting(now) if stopped else item.advance(now, step)
@@ -151,7 +185,8 @@ class TeamController:
         regular = self._guard.relative(seen.dynamics.inverse_sizes)
         relative = min(regular, self.stack.soundness(seen.state))
         share = self._guard.law_share(relative)
-        moment = self._moment(now, seen, led, share)
+        self.outside.see(step, q, v, applied)
+        moment = self._moment(now, seen, led, share, step)
         if share == 1.0:
             self.gate.book(moment, self._mode.law, applied)
         recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
@@ -159,7 +194,9 @@ class TeamController:
         asked = self.team.inverse_dynamics(q, v, wanted)
         torque, safety = self._safety.protect(q, v, asked, seen.state.g, elapsed)
         self._remember(moment, torque, acceleration, share, safety)
+        self._regulate(seen, wrenches, step, held=share < 1.0 or safety.acted)
         self._continuity.note(now, q)
+        self.outside.note(torque)
         return Tick(
             torque,
             seen.state,
@@ -178,9 +215,25 @@ class TeamController:
             self.gate.account,
         )
 
-    def _moment(self, now: float, seen: Seen, led: Sequence[Led], share: float) -> Moment:
-        """This tick as law and account see it."""
-        error, impedance = self._error(seen, led), self._mode.impedance
+    def _regulate(self, seen: Seen, wrenches: Array | None, step: float, held: bool) -> None:
+        """Integrates what is missing of the force goals, unless something holds the law back."""
+        if not self.feels:
+            return
+        held = held or self._mode.stopped or self.gate.account.closing
+        pressing = -seen.dynamics.force_of(self.outside.torque(seen.state, wrenches))
+        self._goals.advance(self._mode.impedance, pressing, step, held)
+
+    def _moment(
+        self, now: float, seen: Seen, led: Sequence[Led], share: float, step: float
+    ) -> Moment:
+        """This tick as law and account see it, with springs that wait one step further."""
+        error = self._error(seen, led)
+        tank = self.gate.tank if self._mode.law == "energy_gated" else None
+        impedance = self._springs.advance(
+            self._mode.impedance, error.e, step, tank, self.gate.settings
+        )
+        if impedance is not self._mode.impedance:
+            self._mode = replace(self._mode, impedance=impedance)
         references = [item.reference for item in led]
         added = (decoupling if share > 0.0 else without_law)(seen.dynamics, error, impedance)
         q, x = seen.state.q, seen.task.x
@@ -246,8 +299,9 @@ class TeamController:
         if self._left is not None:
             impedance = self._left.impedance
             left = self._view.again(seen, impedance.inertias)
-            added = decoupling(left, moment.error, impedance)
-            was = replace(moment, dynamics=left, impedance=impedance, added=added)
+            error = replace(moment.error, goal=self._goals.wanted(impedance))
+            added = decoupling(left, error, impedance)
+            was = replace(moment, error=error, dynamics=left, impedance=impedance, added=added)
             before = self._wanted(self._left, v, was) + self._fade.at(now)
             self._fade.begin(now, before - wanted)
             self._left = None
@@ -273,4 +327,5 @@ class TeamController:
         force = np.concatenate([item.force for item in led])
         e = self.stack.difference(seen.task.x, position)
         e_rate = seen.dynamics.velocity(seen.state.v) - velocity
-        return TaskError(e, e_rate, velocity, acceleration, force)
+        goal = self._goals.wanted(self._mode.impedance)
+        return TaskError(e, e_rate, velocity, acceleration, force, goal)

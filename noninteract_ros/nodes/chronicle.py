@@ -75,6 +75,8 @@ class Chronicle:
             return Level.ERROR, "holding: no states of the team", values
         if self.problem:
             return Level.ERROR, f"holding: {self.problem}", values
+        if problem := self._telemetry.problem():
+            return Level.ERROR, problem, values
         if self._core.mode.stopped:
             return Level.WARN, "stopped", values
         if waiting:
@@ -83,6 +85,9 @@ class Chronicle:
             return Level.WARN, f"running without {', '.join(sorted(absent))}", values
         if conditions := self._telemetry.safety.conditions(now):
             return Level.WARN, "; ".join(conditions), values
+        if (progress := self._core.springs_waiting) is not None:
+            text = f"stiffer springs wait for energy: {100.0 * progress:.0f} % of the change made"
+            return Level.WARN, text, values
         silent_ones = [name for name, is_silent in self._silent.items() if is_silent]
         if silent_ones:
             return Level.WARN, f"holding {', '.join(silent_ones)}: source silent", values

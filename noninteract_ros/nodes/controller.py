@@ -50,7 +50,7 @@ class Controller(ScenarioNode):
         stack = self.scenario.build_stack(team)
         self.core: TeamController = self.scenario.build_controller(team, stack)
         self._queue: deque[Callable[[], None]] = deque()
-        self._state: tuple[int, Array, Array] | None = None
+        self._state: tuple[int, Array, Array, Array | None] | None = None
         self._state_at = self._waiting_since = -np.inf
         self._order, self._lead = StampOrder(), state_lead(general.rate)
         self._missing: list[str] = []
@@ -72,6 +72,7 @@ class Controller(ScenarioNode):
                 self._listen(codec, source)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self.create_service(Trigger, "~/resume", self._on_resume)
+        self.create_service(Trigger, "~/refill", self._on_refill)
         if self.lockstep:
             self.every(WATCH_PERIOD, self._answer_if_complete)
 
@@ -162,7 +163,8 @@ class Controller(ScenarioNode):
             return
         if self._state is None or stamp != self._state[0]:
             self._waiting_since = self._state_at
-        self._state = (stamp, q, v)
+        # In lockstep it can only be the last answer.
+        self._state = (stamp, q, v, None if self.lockstep else self._link.applied)
         if self.lockstep:
             self._answer_if_complete()
 
@@ -185,9 +187,9 @@ class Controller(ScenarioNode):
         if not self._missing:
             self._answer(*self._state)
 
-    def _answer(self, stamp: int, q: Array, v: Array) -> None:
+    def _answer(self, stamp: int, q: Array, v: Array, applied: Array | None) -> None:
         began = time.perf_counter()
-        tick = self.core.step(seconds(stamp), q, v)
+        tick = self.core.step(seconds(stamp), q, v, applied, self._telemetry.wrenches)
         self._link.answer(stamp, tick)
         self._answered = stamp
         self._telemetry.publish(stamp, self.core, tick)
@@ -251,6 +253,10 @@ class Controller(ScenarioNode):
         self._stop_asked = True
         self._post(self.core.stop)
         return self._done(response, "stopped")
+
+    def _on_refill(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._post(self.core.gate.refill)
+        return self._done(response, "energy tank filled")
 
     def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._stop_asked = False

@@ -33,23 +33,33 @@ class LiveParameters:
             name: (hint, rule) for name, hint, rule, _ in node.scenario.parameters() if rule.live
         }
         self._impedances = {name: spec.impedance for name, spec in node.scenario.subtasks.items()}
+        self._tank = node.scenario.tank
         node.add_on_set_parameters_callback(self._on_set)
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
         """Takes all changes or none; the reason names what is allowed."""
-        impedances = dict(self._impedances)
+        impedances, tank = dict(self._impedances), self._tank
         changes: list[Callable[[], None]] = []
         try:
             for parameter in parameters:
-                if parameter.name in self._rules:
+                block, _, item = parameter.name.rpartition(".")
+                if parameter.name not in self._rules:
+                    continue
+                if block == "tank":
+                    value = convert(parameter.name, parameter.value, *self._rules[parameter.name])
+                    tank = replace(tank, **{item: value})
+                else:
                     self._plan(parameter.name, parameter.value, impedances, changes)
             stack_impedance(self._core.stack.subtasks, list(impedances.values()))
+            tank.check()
         except ScenarioError as error:
             return SetParametersResult(successful=False, reason=str(error))
         for name, settings in impedances.items():
             if settings != self._impedances[name]:
                 changes.append(partial(self._core.set_impedance, name, settings))
-        self._impedances = impedances
+        if tank != self._tank:
+            changes.append(partial(setattr, self._core.gate, "settings", tank))
+        self._impedances, self._tank = impedances, tank
         self._post(partial(_run_all, changes))
         return SetParametersResult(successful=True)
 

@@ -3,6 +3,7 @@
 
 from sensor_msgs.msg import JointState
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.efforts import EffortOutputs
@@ -24,10 +25,12 @@ class TeamLink:
 
     Attributes:
         efforts: The robots' own effort controllers.
+        applied: Torque that the newest state tells, shape (n,) [N or N m], or None.
     """
 
     def __init__(self, node: ScenarioNode, team: Team, take: TakeState) -> None:
         self._take = take
+        self.applied: Array | None = None
         self._codec = JointStateCodec(team.joint_names, required=("position", "velocity"))
         self._publish_to = node.create_publisher(JointState, "joint_commands", LOOP_QOS)
         self.efforts = EffortOutputs(node, team)
@@ -39,7 +42,7 @@ class TeamLink:
             node.subscribe(JointState, "joint_states", self._on_state, raw=True)
 
     def _on_state(self, data: bytes) -> None:
-        stamp, position, velocity, _ = self._codec.decode(data)
+        stamp, position, velocity, self.applied = self._codec.decode(data)
         assert position is not None  # The codec requires both.
         assert velocity is not None
         self._take(stamp, position, velocity)

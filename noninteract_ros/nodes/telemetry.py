@@ -15,6 +15,7 @@ from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.lockstep import StampOrder, state_lead
 from noninteract_ros.nodes.messages import EnergyCodec, SubtaskCodec, external_wrench
 from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.nodes.team_energy import TeamEnergy, told, unsound
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
@@ -31,6 +32,7 @@ class Telemetry:
 
     Attributes:
         safety: What to tell of singularities and joint limits.
+        wrenches: Newest wrenches on the tools, shape (N, 6) [N, N m]; zero where no sensor is.
     """
 
     def __init__(self, node: ScenarioNode, team: Team, stack: SubtaskStack) -> None:
@@ -42,7 +44,7 @@ class Telemetry:
         self._answered = 0
         self._tick: Tick | None = None
         self.safety = SafetyWatch(team.joint_names)
-        self._wrenches = np.zeros((len(team.names), 6))
+        self.wrenches = np.zeros((len(team.names), 6))
         self._order, self._lead = StampOrder(), state_lead(general.rate)
         self._wrench_stamps = dict.fromkeys(general.force_sensors, -1)
         for name in general.force_sensors:
@@ -53,6 +55,7 @@ class Telemetry:
             for task in stack.subtasks
         ]
         self._energy_codec = EnergyCodec(ENERGY_LABELS)
+        self._team_energy = TeamEnergy(node)
         make = node.create_publisher
         names = stack.names
         motion = MultiDOFJointTrajectory
@@ -69,13 +72,14 @@ class Telemetry:
     def _on_wrench(self, robot: str, message: WrenchStamped) -> None:
         stamp, wrench = external_wrench(message)
         self._order.take(robot, stamp, self._lead)
-        self._wrenches[self._team.index(robot)] = wrench
+        self.wrenches[self._team.index(robot)] = wrench
         self._wrench_stamps[robot] = stamp
 
     def forget(self) -> None:
         """Forgets the wrenches that have come so far."""
         self._order.forget()
         self.safety.reset()
+        self._team_energy.forget()
         self._wrench_stamps = dict.fromkeys(self._wrench_stamps, -1)
 
     def missing(self, stamp: int) -> list[str]:
@@ -100,7 +104,8 @@ class Telemetry:
                 publisher.publish(self._codecs[i].encode_wrench(stamp, feedback))
         if not due:
             return
-        energy = core.energy(tick, self._team.external_torque(tick.state, self._wrenches))
+        energy = core.energy(tick, self._team.external_torque(tick.state, self.wrenches))
+        self._team_energy.publish(stamp, tick, core.outside.torque(tick.state, self.wrenches))
         accounts = np.array([energy.storage, energy.rate, energy.supplied, energy.dissipated]).T
         for i, codec in enumerate(self._codecs):
             wanted, values = tick.led[i].reference, self._stack.value_slices[i]
@@ -124,4 +129,8 @@ class Telemetry:
         for name, part in zip(self._stack.names, self._stack.slices, strict=True):
             values[f"{name} error"] = float(np.abs(self._tick.error.e[part]).max())
         values |= self.safety.values()
-        return values
+        return values | told(self._tick.account)
+
+    def problem(self) -> str:
+        """What is wrong with the energy account, or an empty text."""
+        return unsound(self._tick.account) if self._tick else ""

@@ -142,7 +142,8 @@ class _Recording:
             )  # fmt: skip
             if tick % self._period == 0:
                 self._tell(now, result, wrenches)
-        status = to_status("/team/controller", Level.OK, "running", {"law": "noninteracting"})
+        values = {"law": self._rehearsal.controller.mode.law}
+        status = to_status("/team/controller", Level.OK, "running", values)
         message = to_diagnostics(1, [status])
         self._writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(message))
 
