@@ -242,11 +242,13 @@ class Controller(ScenarioNode):
         if problem == self._chronicle.problem:
             return
         self._chronicle.problem = problem
-        text = f"holding the team still: {problem}" if problem else "the team is free again"
-        (self.get_logger().error if problem else self.get_logger().info)(text)
-        if problem and not self.core.mode.stopped:
-            self.core.stop()
-        elif not problem and not self._stop_asked:
+        if problem:
+            self.get_logger().error(f"holding the team still: {problem}")
+            if not self.core.mode.stopped:
+                self.core.stop()
+            return
+        self.get_logger().info("no longer holding the team still")
+        if not self._stop_asked:
             self.core.resume()
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
