@@ -8,6 +8,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.desired import DesiredMotion
+from noninteract_ros.control.hand_over import HandOvers
 from noninteract_ros.control.impedance import spread
 from noninteract_ros.control.inputs import SOURCES, Motion, Source
 from noninteract_ros.control.reference import Reference
@@ -33,6 +34,12 @@ class InputSettings:
         " with the jump it brings",
         "shaped",
         choices=("shaped", "direct"),
+    )
+    hand_over_times: tuple[float, ...] = key(
+        "When the subtask is handed over, in the team's time [s]", (), minimum=0.0
+    )
+    hand_over_to: tuple[str, ...] = key(
+        "Who takes it at each of these times", (), choices=AUTHORITIES
     )
     max_velocity: tuple[float, ...] = key(
         "Velocity bound of shaped motions [m/s; rad/s]", (1.0,), positive=True
@@ -77,6 +84,8 @@ class SubtaskInput:
     def __init__(self, subtask: Subtask, settings: InputSettings) -> None:
         self.authority = settings.authority
         self.sources = {name: Source() for name in SOURCES}
+        plan = settings.hand_over_times, settings.hand_over_to
+        self._hand_overs = HandOvers(*plan, subtask.name)
         self._timeout = settings.timeout
         names = ("max_velocity", "max_acceleration", "max_jerk")
         limits = np.array([spread(subtask, name, getattr(settings, name)) for name in names])
@@ -104,6 +113,7 @@ class SubtaskInput:
     def reset(self) -> None:
         """Starts anew with sources that have never spoken."""
         self.sources.update({name: Source() for name in SOURCES})
+        self._hand_overs.reset()
 
     def advance(self, now: float, step: float) -> Led:
         """What to do at this tick.
@@ -123,6 +133,7 @@ class SubtaskInput:
 
     def _take(self, now: float) -> None:
         """Takes what has come due, so that no input piles up, of whatever source."""
+        self.authority = self._hand_overs.due(now) or self.authority
         for source in self.sources.values():
             source.motion(now)
             source.force(now)

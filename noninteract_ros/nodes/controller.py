@@ -19,6 +19,7 @@ from noninteract_ros.control.inputs import HORIZON, SOURCES, Force, Motion, Rate
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import InputError
+from noninteract_ros.nodes.authority import AuthorityTopics
 from noninteract_ros.nodes.chronicle import Chronicle
 from noninteract_ros.nodes.controller_parameters import LiveParameters
 from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder, state_lead
@@ -60,6 +61,7 @@ class Controller(ScenarioNode):
         self._telemetry = Telemetry(self, team, stack)
         self._chronicle = Chronicle(self, self.core, self._telemetry)
         self._live = LiveParameters(self, self.core, self._post)
+        self._authority = AuthorityTopics(self, stack.names)
         self._watch = SourceWatch(
             general.lockstep_sources if self.lockstep else (),
             self.core.inputs,

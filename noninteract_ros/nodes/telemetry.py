@@ -25,6 +25,8 @@ ENERGY_LABELS = ("time", "storage", "rate", "supplied", "dissipated", "intervent
 class Telemetry:
     """Publishes feedback to a human at every tick, everything else at the telemetry rate.
 
+    A human who waits to take over, as a source that lockstep waits for, feels at every tick too.
+
     Args:
         node: The controller's node.
         team: The robots.
@@ -62,6 +64,10 @@ class Telemetry:
         self._state_to = [make(motion, f"{name}/state", LOOP_QOS) for name in names]
         self._desired_to = [make(motion, f"{name}/desired", LOOP_QOS) for name in names]
         self._energy_to = [make(Float64MultiArray, f"{name}/energy", LOOP_QOS) for name in names]
+        # A hand that waits for what it feels, and is waited for, hears every tick.
+        self._awaited = {
+            i for i, name in enumerate(names) if f"{name}/human" in general.lockstep_sources
+        }
         # A wrench has one element; a subtask with several edges has no device to be felt with.
         self._feedback_to = {
             i: make(WrenchStamped, f"{task.name}/feedback", LOOP_QOS)
@@ -99,7 +105,7 @@ class Telemetry:
         due = count % self._period == 0
         self._answered += 1
         for i, publisher in self._feedback_to.items():
-            if due or tick.led[i].source == "human":
+            if due or i in self._awaited or tick.led[i].source == "human":
                 feedback = tick.feedback[slices[i]]
                 publisher.publish(self._codecs[i].encode_wrench(stamp, feedback))
         if not due:
