@@ -66,6 +66,10 @@ class TaskDynamics:
         """Joint acceleration S (a - J_rate v) that gives a task acceleration, shape (n,)."""
         return self.S @ (task_acceleration - self.J_rate @ v)
 
+    def torque(self, v: Array, joint_acceleration: Array) -> Array:
+        """M a + C v + g, shape (n,) [N or N m]."""
+        return self.M @ joint_acceleration + self.C @ v + self.g
+
     def coriolis_force(self, e_rate: Array) -> Array:
         """C~_i e_rate_i of every subtask with C~_i = S_i' (C S_i + M dS_i/dt), shape (n,)."""
         U = _spread_by_subtask(self, e_rate)
@@ -176,14 +180,6 @@ def inverse(J: Array) -> Array:
     except np.linalg.LinAlgError:
         size = float(np.abs(J).max()) or 1.0
         return np.linalg.inv(J + 1e-9 * size * np.eye(len(J)))
-
-
-def inverses(blocks: Array) -> Array:
-    """Inverses of square blocks, shape (N, m, m); of singular ones as `inverse` has them."""
-    try:
-        return np.linalg.inv(blocks)
-    except np.linalg.LinAlgError:
-        return np.array([inverse(block) for block in blocks])
 
 
 def commanded_acceleration(

@@ -1,16 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which subtask plays which role in a structured team, and where its numbers are."""
 
-from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.control.compiled.parts import EDGES, JOINTS, MEAN, Places, Plan
 from noninteract_ros.control.robot_terms import RobotByRobot
-from noninteract_ros.control.structured import Coordinates, Group, Places
-from noninteract_ros.control.tree import Tree
+from noninteract_ros.control.structured import Coordinates
 from noninteract_ros.subtasks.mixing import EdgeMixing, JointMixing, MeanMixing
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import Subtask
@@ -28,7 +27,7 @@ class Roles:
         weights: Weights of the mean tool point, shape (N,).
         rotation: Mean orientation, or None.
         offsets: Constant rotations of the tools, shape (N, 3, 3), or None.
-        tree: The edges.
+        steps: A walk over the edges, as `Plan` has it.
         framed_points: Whether the edges' positions are seen from the mean's frame.
         framed_rotations: Whether their rotations are.
         joints: The chosen joints, by subtask.
@@ -38,7 +37,7 @@ class Roles:
     weights: Array
     rotation: TeamRotation | None
     offsets: Array | None
-    tree: Tree
+    steps: Places
     framed_points: bool
     framed_rotations: bool
     joints: tuple[JointMixing, ...]
@@ -76,7 +75,7 @@ class Roles:
             return None
         rotation = turning_means[0].rotation if turning_means else None
         offsets = rotation.offsets if rotation is not None else None
-        tree = _tree(edges, len(team.robots))
+        steps = _walk(edges, len(team.robots))
         axes = mean_points[0].axes if mean_points else ()
         framed_points = bool(edge_points) and edge_points[0].frame is not None
         framed_rotations = bool(turning_edges) and turning_edges[0].frame is not None
@@ -87,20 +86,28 @@ class Roles:
             and (axes == AXES or not framed_points)
             and _square(team, len(axes) + 3 * len(turning_means), joints)
         )
-        if tree is None or not fits:
+        if steps is None or not fits:
             return None
         weights = mean_points[0].weights if mean_points else np.zeros(len(team.robots))
-        return cls(axes, weights, rotation, offsets, tree, framed_points, framed_rotations, joints)
+        return cls(axes, weights, rotation, offsets, steps, framed_points, framed_rotations, joints)
 
 
-def _tree(edges: Sequence[EdgeMixing], count: int) -> Tree | None:
+def _walk(edges: Sequence[EdgeMixing], count: int) -> Places | None:
+    """The walk of `Plan.steps`; None if the edges are no tree over all robots."""
     pairs = edges[0].pairs
     if len(pairs) != count - 1 or any(item.pairs != pairs for item in edges):
         return None
-    try:
-        return Tree(pairs)
-    except ValueError:
-        return None
+    around: list[list[tuple[int, int, int]]] = [[] for _ in range(count)]
+    for edge, (first, second) in enumerate(pairs):
+        around[first].append((edge, second, -1))
+        around[second].append((edge, first, 1))
+    reached, steps = [0], []
+    for robot in reached:  # It grows meanwhile.
+        for edge, other, side in around[robot]:
+            if other not in reached:
+                reached.append(other)
+                steps.append((edge, robot, other, side))
+    return np.array(steps, dtype=np.intp) if len(reached) == count else None
 
 
 def _same(first: Array | None, second: Array | None) -> bool:
@@ -120,29 +127,10 @@ def _square(team: Team, h: int, joints: Sequence[JointMixing]) -> bool:
     return own == sizes and len(set(chosen)) == len(chosen)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ValuePlaces:
-    """Where the values of the roles are among all values.
-
-    Attributes:
-        mean_position: Shape (axes,).
-        mean_rotation: Shape (4,) or (0,).
-        edge_positions: Shape (N - 1, axes).
-        edge_rotations: Shape (N - 1, 4) or (N - 1, 0).
-        joints: Shape (P,).
-    """
-
-    mean_position: Places
-    mean_rotation: Places
-    edge_positions: Places
-    edge_rotations: Places
-    joints: Places
-
-    @classmethod
-    def of(cls, stack: SubtaskStack) -> "ValuePlaces":
-        """Places in a stack's values."""
-        mean, edges, joints = _by_role(stack, stack.value_slices)
-        return cls(mean[0][0], mean[1][0], edges[0], edges[1], joints)
+def value_places(stack: SubtaskStack) -> tuple[Places, Places]:
+    """Places of the values among all: those of mean and edges, sorted as `Plan` has it; joints."""
+    mean, edges, joints = _by_role(stack, stack.value_slices)
+    return np.concatenate([np.hstack(mean).ravel(), np.hstack(edges).ravel()]), joints
 
 
 def coordinates(
@@ -150,50 +138,40 @@ def coordinates(
 ) -> Coordinates:
     """Where the coordinates of the subtasks are, stacked and robot by robot."""
     mean, edges, joints = _by_role(stack, stack.slices)
-    h, m, a = len(roles.axes) + 3 * (roles.rotation is not None), robots.m, len(roles.axes)
+    m, h = robots.m, len(roles.axes) + 3 * (roles.rotation is not None)
     used = [h] * len(team.robots)
-    slots = []
-    for place in roles.in_v:
-        robot = int(robots.slots[place]) // m
-        slots.append(robot * m + used[robot])
+    chosen = np.empty(len(joints), dtype=np.intp)
+    for i, place in enumerate(roles.in_v):
+        robot = int(robots.joints[place]) // m
+        chosen[i] = robot * m + used[robot]
         used[robot] += 1
-    parts = [slice(0 if t.axes else a, h if t.rotates else a) for t in stack.subtasks]
-    kinds = [type(task.mixing) for task in stack.subtasks]
     sizes = [part.stop - part.start for part in stack.slices]
-    return Coordinates(
-        h,
-        np.hstack(mean)[0],
-        np.hstack(edges),
-        joints,
-        np.array(slots, dtype=np.intp),
-        stack.slices,
-        np.repeat(np.arange(len(sizes)), sizes),
-        tuple(p if k is MeanMixing else None for p, k in zip(parts, kinds, strict=True)),
-        tuple(p if k is EdgeMixing else None for p, k in zip(parts, kinds, strict=True)),
-        tuple(_groups(stack, slots, joints, m)),
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    by_robot = np.lexsort((chosen // m, owner[joints]))
+    order = [np.hstack(mean).ravel(), np.hstack(edges).ravel(), joints[by_robot]]
+    plan = Plan(
+        np.concatenate(order),
+        owner,
+        chosen[by_robot],
+        robots.joints,
+        roles.steps,
+        roles.framed_points or roles.framed_rotations,
+        _parts(stack, len(roles.axes), h),
     )
+    return Coordinates(h, plan, stack.slices, team.velocity_slices, chosen)
 
 
-def _groups(
-    stack: SubtaskStack, slots: Sequence[int], joints: Places, m: int
-) -> list[tuple[Group, ...]]:
-    """For each subtask its chosen joints, in groups of robots with equally many."""
-    result = []
-    for part, task in zip(stack.slices, stack.subtasks, strict=True):
-        by_robot: dict[int, list[tuple[int, int]]] = defaultdict(list)
-        if isinstance(task.mixing, JointMixing):
-            for place, slot in zip(joints.tolist(), slots, strict=True):
-                if part.start <= place < part.stop:
-                    by_robot[slot // m].append((slot % m, place - part.start))
-        by_count: dict[int, list[int]] = defaultdict(list)
-        for robot, found in by_robot.items():
-            by_count[len(found)].append(robot)
-        groups = []
-        for members in by_count.values():
-            table = np.array([by_robot[robot] for robot in members])
-            groups.append((np.array(members)[:, None], table[..., 0], table[..., 1]))
-        result.append(tuple(groups))
-    return result
+def _parts(stack: SubtaskStack, a: int, h: int) -> Places:
+    """What each subtask has of the sorted coordinates, see `Plan.parts`."""
+    rows, joints = [], 0
+    for task in stack.subtasks:
+        if _is(task, JointMixing):
+            rows.append((JOINTS, joints, joints + task.dim))
+            joints += task.dim
+        else:
+            role = MEAN if _is(task, MeanMixing) else EDGES
+            rows.append((role, 0 if task.axes else a, h if task.rotates else a))
+    return np.array(rows, dtype=np.intp)
 
 
 def _by_role(

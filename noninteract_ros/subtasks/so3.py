@@ -25,7 +25,7 @@ _TERMS = range(12)
 _POWERS = np.arange(float(len(_TERMS)))
 
 
-class _Coefficient:
+class Coefficient:
     """An even function f of the angle t, exact at any angle below 2 pi.
 
     Args:
@@ -41,17 +41,17 @@ class _Coefficient:
         slope: Callable[[Array], Array],
     ) -> None:
         self._value, self._slope = value, slope
-        self._series = np.array(series)
-        self._slope_series = 2.0 * _POWERS[1:] * self._series[1:]
+        self.series = np.array(series)
+        self.slope_series = 2.0 * _POWERS[1:] * self.series[1:]
 
     def value(self, phi: Array) -> Array:
         """f(|phi|), shape (..., 1, 1)."""
-        return self._at(phi, self._series, self._value)
+        return self._at(phi, self.series, self._value)
 
     def slope(self, phi: Array, phi_rate: Array) -> Array:
         """df/dt along a motion of phi, shape (..., 1, 1)."""
         along = (phi * phi_rate).sum(axis=-1)[..., None, None]
-        return along * self._at(phi, self._slope_series, self._slope)
+        return along * self._at(phi, self.slope_series, self._slope)
 
     @staticmethod
     def _at(phi: Array, series: Array, closed: Callable[[Array], Array]) -> Array:
@@ -64,17 +64,17 @@ class _Coefficient:
 
 
 _BERNOULLI = bernoulli(2 * len(_TERMS))
-_A = _Coefficient(
+ANGLE_A = Coefficient(
     [(-1) ** k / math.factorial(2 * k + 2) for k in _TERMS],
     lambda t: (1.0 - np.cos(t)) / t**2,
     lambda t: (t * np.sin(t) + 2.0 * np.cos(t) - 2.0) / t**4,
 )
-_B = _Coefficient(
+ANGLE_B = Coefficient(
     [(-1) ** k / math.factorial(2 * k + 3) for k in _TERMS],
     lambda t: (t - np.sin(t)) / t**3,
     lambda t: (3.0 * np.sin(t) - t * np.cos(t) - 2.0 * t) / t**5,
 )
-_C = _Coefficient(
+ANGLE_C = Coefficient(
     [abs(_BERNOULLI[2 * k + 2]) / math.factorial(2 * k + 2) for k in _TERMS],
     lambda t: (1.0 - 0.5 * t / np.tan(0.5 * t)) / t**2,
     lambda t: (0.5 * t / np.tan(0.5 * t) + 0.25 * (t / np.sin(0.5 * t)) ** 2 - 2.0) / t**4,
@@ -149,30 +149,30 @@ def quaternion(R: Array) -> Array:
 def jacobian(phi: Array) -> Array:
     """A(phi), shape (..., 3, 3): angular velocity of exp(phi) per rate of phi."""
     cross = hat(phi)
-    return _IDENTITY + _A.value(phi) * cross + _B.value(phi) * (cross @ cross)
+    return _IDENTITY + ANGLE_A.value(phi) * cross + ANGLE_B.value(phi) * (cross @ cross)
 
 
 def jacobian_rate(phi: Array, phi_rate: Array) -> Array:
     """dA/dt along a motion of phi, shape (..., 3, 3)."""
     cross, cross_rate = hat(phi), hat(phi_rate)
-    linear = _A.slope(phi, phi_rate) * cross + _A.value(phi) * cross_rate
-    return linear + _squared_rate(_B, phi, phi_rate, cross, cross_rate)
+    linear = ANGLE_A.slope(phi, phi_rate) * cross + ANGLE_A.value(phi) * cross_rate
+    return linear + _squared_rate(ANGLE_B, phi, phi_rate, cross, cross_rate)
 
 
 def inverse_jacobian(phi: Array) -> Array:
     """A(phi)^-1, shape (..., 3, 3); it is bounded up to |phi| = pi and singular at 2 pi."""
     cross = hat(phi)
-    return _IDENTITY - 0.5 * cross + _C.value(phi) * (cross @ cross)
+    return _IDENTITY - 0.5 * cross + ANGLE_C.value(phi) * (cross @ cross)
 
 
 def inverse_jacobian_rate(phi: Array, phi_rate: Array) -> Array:
     """d(A^-1)/dt along a motion of phi, shape (..., 3, 3)."""
     cross, cross_rate = hat(phi), hat(phi_rate)
-    return _squared_rate(_C, phi, phi_rate, cross, cross_rate) - 0.5 * cross_rate
+    return _squared_rate(ANGLE_C, phi, phi_rate, cross, cross_rate) - 0.5 * cross_rate
 
 
 def _squared_rate(
-    factor: _Coefficient, phi: Array, phi_rate: Array, cross: Array, cross_rate: Array
+    factor: Coefficient, phi: Array, phi_rate: Array, cross: Array, cross_rate: Array
 ) -> Array:
     """Rate of f [phi]^2."""
     mixed = cross_rate @ cross

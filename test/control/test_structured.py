@@ -99,7 +99,7 @@ class Pair:
         q = self.team.integrate(self.team.q0, rng.uniform(-0.3, 0.3, n))
         self.v, inertias = rng.normal(size=n), self.impedance.inertias
         self.dense = DenseView(self.team, self.stack).evaluate(q, self.v, inertias)
-        structure = Structure.of(self.team, self.stack, 2)
+        structure = Structure.of(self.team, self.stack)
         assert structure is not None
         self.structured = structure.evaluate(q, self.v, inertias)
         self.error = TaskError(*rng.normal(size=(5, n)))
@@ -245,7 +245,7 @@ def results_of_law(count):
     impedance = stack_impedance(
         stack.subtasks, [ImpedanceSettings((40.0,), (9.0,)) for _ in stack.subtasks]
     )
-    structure = Structure.of(team, stack, 2)
+    structure = Structure.of(team, stack)
     rng = np.random.default_rng(0)
     seen = structure.evaluate(team.q0, rng.normal(size=team.n), impedance.inertias)
     dynamics = seen.dynamics
