@@ -9,6 +9,8 @@ VENV := .venv
 BIN := $(VENV)/bin
 METADATA := setup.py setup.cfg pyproject.toml
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# Otherwise the first controller does it, while others wait for it.
+COMPILE = $(BIN)/python -m noninteract_ros.control.compile_ahead
 
 # Discovery never leaves this machine, and small matrices gain nothing from more threads.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
@@ -33,6 +35,7 @@ $(BIN)/python:
 $(VENV)/installed: $(METADATA) | $(BIN)/python
 	@echo "Installing into $(VENV): about a minute and 1 GB the first time"
 	$(PIP_INSTALL) --editable .
+	@$(COMPILE)
 	@touch $@
 
 $(VENV)/installed-robots: $(VENV)/installed
@@ -43,6 +46,7 @@ $(VENV)/installed-robots: $(VENV)/installed
 $(VENV)/installed-dev: $(METADATA) | $(BIN)/python
 	@echo "Installing into $(VENV): about a minute and 1.5 GB the first time"
 	$(PIP_INSTALL) --editable '.[dev]'
+	@$(COMPILE)
 	@touch $(VENV)/installed $(VENV)/installed-robots $@
 
 venv: $(VENV)/installed-dev ## make .venv with the package (editable) and the developers' tools

@@ -46,6 +46,7 @@ setup(
         "ros-jazzy-rclpy[fastrtps]>=7.1.6",
         "ros-jazzy-common-interfaces>=5.3.6",
         "numpy>=2.4",
+        "numba>=0.68",
         "pin>=4.1",
         "pyyaml>=6.0",
         "ruckig>=0.19",

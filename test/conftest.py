@@ -16,6 +16,14 @@ if TYPE_CHECKING:
 DOMAINS = range(10, 60)  # Up to 101, ports stay below the ephemeral ones; other tests have theirs.
 
 
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compiles the law before any worker or program of a test would, each with its deadline."""
+    if not hasattr(session.config, "workerinput"):
+        from noninteract_ros.control.compile_ahead import compile_ahead
+
+        compile_ahead()
+
+
 @pytest.fixture
 def domain() -> Iterator[int]:
     """A ROS domain that no other test on this machine uses at the same time."""

@@ -32,8 +32,13 @@ class RobotByRobot:
         N, m = len(sizes), max(sizes)
         self.m = m
         self.joints: Places = np.concatenate([k * m + np.arange(n) for k, n in enumerate(sizes)])
-        jacobians, positions, turns = np.zeros((2, N, 6, m)), np.zeros((N, 3)), np.zeros((N, 3, 3))
-        self.poses = Poses(*jacobians, positions, turns, np.zeros((N, 6)))
+        self.poses = Poses(
+            np.zeros((N, 6, m)),
+            np.zeros((N, 6, m)),
+            np.zeros((N, 3)),
+            np.zeros((N, 3, 3)),
+            np.zeros((N, 6)),
+        )
         self._start = np.zeros((OWN_PARTS, N, m, m))
         self._start[0] = np.eye(m)
         self._translations, self._rotations = np.zeros((N, 3)), np.zeros((N, 3, 3))
@@ -60,8 +65,12 @@ class RobotByRobot:
         for number in model.supports[joint]:
             if number:
                 self._moves[k, model.joints[number].idx_v] = 1.0
-        pose = data.oMi[joint]
-        views = data.M, data.C, data.J, data.dJ, pose.translation, pose.rotation
+        pose, n = data.oMi[joint], model.nv
+        square = (array.reshape(n, n, order="F") for array in (data.M, data.C))
+        wide = (
+            array.reshape(6, n, order="F") for array in (data.J, data.dJ)
+        )  # Of one joint: (6,).
+        views = *square, *wide, pose.translation, pose.rotation
         self._parts.append((model, data, in_q, in_v, views))
 
     def tools(self, rows: Places, turning: bool, offsets: Array | None, chosen: Array) -> Tools:
@@ -85,7 +94,8 @@ class RobotByRobot:
             array[:] = constant
         way = np.zeros((len(terms[0]), self.m, 1))
         way.reshape(-1)[self.joints] = q
-        self.poses.positions += (self.poses.jacobians[:, :3] @ way)[..., 0]
+        positions = self.poses.positions
+        positions += (self.poses.jacobians[:, :3] @ way)[..., 0]
         return terms.copy(), g
 
     def _found(self, q: Array, v: Array) -> tuple[Array, Array]:
@@ -94,5 +104,5 @@ class RobotByRobot:
             q_k, v_k = q[in_q], v[in_v]
             pin.computeAllTerms(model, data, q_k, v_k)
             pin.computeCoriolisMatrix(model, data, q_k, v_k)
-            gather(k, *views, blocks, *self.poses[:4])
+            gather(k, blocks, self.poses, *views)
         return blocks, np.concatenate(self._gravity)

@@ -35,6 +35,7 @@ class Structure:
         chosen = self._chosen_rows(roles)
         self._tools = self._robots.tools(rows, turning, roles.offsets, chosen)
         self._means = Means(roles.weights, values, roles.framed_points, roles.framed_rotations)
+        self._found(team.q0, np.zeros(team.n), (None,) * len(stack.subtasks))[1].warm_up()
 
     @classmethod
     def of(cls, team: Team, stack: SubtaskStack) -> "Structure | None":
@@ -55,6 +56,14 @@ class Structure:
 
     def evaluate(self, q: Array, v: Array, inertias: DesiredInertias) -> Seen:
         """Everything at a state, with the subtasks' desired inertias."""
+        x, dynamics = self._found(q, v, inertias)
+        state = DeferredState(self._team, q, v, dynamics.g)
+        return Seen(state, DeferredTask(x, dynamics), dynamics)
+
+    def _found(
+        self, q: Array, v: Array, inertias: DesiredInertias
+    ) -> tuple[Array, StructuredDynamics]:
+        """Values and task dynamics at a state."""
         plan, poses, h = self._places.plan, self._robots.poses, self._places.h
         blocks, g = self._robots.evaluate(q, v)
         robot_terms(plan, self._tools, poses, blocks, v)
@@ -62,9 +71,8 @@ class Structure:
         x = np.empty(self._size)
         x[self._joints] = q[self._joints_in_q]
         mixing_terms(plan, self._tools, self._means, poses, mixers, G_inverse, x)
-        dynamics = StructuredDynamics(self._places, blocks, mixers, G_inverse, g, inertias)
-        return Seen(DeferredState(self._team, q, v, g), DeferredTask(x, dynamics), dynamics)
+        return x, StructuredDynamics(self._places, blocks, mixers, G_inverse, g, inertias)
 
     def again(self, seen: Seen, inertias: DesiredInertias) -> TaskDynamics:
         """Task dynamics of the same state with other desired inertias."""
-        return self.evaluate(seen.state.q, seen.state.v, inertias).dynamics
+        return self._found(seen.state.q, seen.state.v, inertias)[1]

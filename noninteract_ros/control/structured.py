@@ -113,6 +113,25 @@ class StructuredDynamics(TaskDynamics):
             result[part, part] = block[:size, :size]
         return result
 
+    def warm_up(self) -> None:
+        """Has every method compiled, which must not happen in a tick."""
+        some = np.zeros_like(self.g)
+        for pair in (self.acceleration_of, self.joint_acceleration, self.torque):
+            pair(some, some)
+        for single in (
+            self.velocity,
+            self.coriolis_force,
+            self.natural_coriolis_force,
+            self.force_of,
+            self.multiply_by_inertia,
+            self.divide_by_inertia,
+            self.multiply_by_inertias,
+            self.divide_by_inertias,
+            self.decoupled_external_force,
+        ):
+            single(some)
+        _ = self.inverse_sizes
+
     @property
     def inverse_sizes(self) -> Array:
         """The Frobenius norm of S, shape (1,)."""

@@ -89,7 +89,9 @@ class Roles:
         if steps is None or not fits:
             return None
         weights = mean_points[0].weights if mean_points else np.zeros(len(team.robots))
-        return cls(axes, weights, rotation, offsets, steps, framed_points, framed_rotations, joints)
+        return cls(
+            axes, weights, rotation, offsets, steps, framed_points, framed_rotations, joints
+        )
 
 
 def _walk(edges: Sequence[EdgeMixing], count: int) -> Places | None:

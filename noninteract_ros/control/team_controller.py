@@ -191,7 +191,7 @@ class TeamController:
             self.gate.book(moment, self._mode.law, applied)
         recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
         acceleration, wanted = self._blended(seen, moment, share, recovery)
-        asked = self.team.inverse_dynamics(q, v, wanted)
+        asked = seen.dynamics.torque(v, wanted)
         torque, safety = self._safety.protect(q, v, asked, seen.state.g, elapsed)
         self._remember(moment, torque, acceleration, share, safety)
         self._regulate(seen, wrenches, step, held=share < 1.0 or safety.acted)

@@ -31,7 +31,7 @@ from noninteract_ros.nodes.stack import Processes, programs_of
 from noninteract_ros.scenario import Scenario
 
 NAMESPACE = "bench"  # beside a stack that may be running
-START_TIMEOUT = 60.0  # [s]
+START_TIMEOUT = 180.0  # [s] at the first start on a machine the law is compiled
 POLL_PERIOD = 0.004  # [s]
 
 

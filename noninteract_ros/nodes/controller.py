@@ -47,6 +47,7 @@ class Controller(ScenarioNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("controller", **kwargs)
         general = self.scenario.general
+        self.get_logger().info("preparing the law; its first start on a machine takes a while")
         team = self.scenario.build_team()
         stack = self.scenario.build_stack(team)
         self.core: TeamController = self.scenario.build_controller(team, stack)

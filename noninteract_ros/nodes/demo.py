@@ -14,7 +14,7 @@ from noninteract_ros.nodes.parameter_files import rewrite
 from noninteract_ros.nodes.stack import InProcess, Processes, Stack, programs_of
 from noninteract_ros.scenario_file import load_scenario
 
-START_TIMEOUT = 60.0  # [s]
+START_TIMEOUT = 180.0  # [s] at the first start on a machine the law is compiled
 STALL_TIMEOUT = 60.0  # [s] wall time without a step after which a run is given up
 LISTEN = 1.0  # [s] time to find out who else is in the namespace
 

@@ -4,13 +4,13 @@
 import hashlib
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-FIRST = np.intp(0)  # Not a literal, for which numba would compile functions once more.
+FIRST = cast(int, np.intp(0))  # A literal would have functions compiled once more.
 
 
 def _stamp() -> bytes:

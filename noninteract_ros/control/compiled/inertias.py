@@ -99,9 +99,7 @@ def _divide_edges(
     for step in range(len(plan.steps)):
         edge, side = plan.steps[step, 0], plan.steps[step, 3]
         for i in range(p):
-            f[0, i, 0] = side * (
-                free[plan.steps[step, 2], i, 0] - free[plan.steps[step, 1], i, 0]
-            )
+            f[0, i, 0] = side * (free[plan.steps[step, 2], i, 0] - free[plan.steps[step, 1], i, 0])
         for i in range(p):
             total = 0.0
             for j in range(p):

@@ -72,9 +72,7 @@ def _first_guess(weights: Array, tools: Array) -> rotations.Quaternion:
 
 
 @inner
-def put_turning(
-    A: Mixing, a: int, weights: Array, phis: Array, poses: Poses
-) -> rotations.Vector:
+def put_turning(A: Mixing, a: int, weights: Array, phis: Array, poses: Poses) -> rotations.Vector:
     """Writes G of the rotations and its rate; returns the mean's angular velocity.
 
     With A_k = A(phi_k)^-1 and B = sum of w_k A_k', G_k = w_k B^-1 A_k R_k.
@@ -85,8 +83,14 @@ def put_turning(
     x, y, z = 0.0, 0.0, 0.0
     for k in range(N):
         rotations.put_inverse_jacobian(rotations.vector_at(phis, k, FIRST), jacobians, k)
-        turned = rotations.times(jacobians, k, rotations.vector_at(poses.twists, k, rotations.ANGULAR))
-        x, y, z = x + weights[k] * turned[0], y + weights[k] * turned[1], z + weights[k] * turned[2]
+        turned = rotations.times(
+            jacobians, k, rotations.vector_at(poses.twists, k, rotations.ANGULAR)
+        )
+        x, y, z = (
+            x + weights[k] * turned[0],
+            y + weights[k] * turned[1],
+            z + weights[k] * turned[2],
+        )
         for i in range(3):
             for j in range(3):
                 B[0, i, j] += weights[k] * jacobians[k, j, i]
@@ -94,7 +98,10 @@ def put_turning(
     omega_c = rotations.times(B_inverse, FIRST, (x, y, z))
     found, moved = np.zeros((N, 3, 3)), np.zeros((N, 3, 3))
     for k in range(N):
-        phi, omega = rotations.vector_at(phis, k, FIRST), rotations.vector_at(poses.twists, k, rotations.ANGULAR)
+        phi, omega = (
+            rotations.vector_at(phis, k, FIRST),
+            rotations.vector_at(poses.twists, k, rotations.ANGULAR),
+        )
         turned = rotations.times(jacobians, k, omega)
         back = rotations.transposed_times(jacobians, k, omega_c)
         phi_rate = turned[0] - back[0], turned[1] - back[1], turned[2] - back[2]

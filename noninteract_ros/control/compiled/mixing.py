@@ -82,9 +82,7 @@ def unmix(
 
 
 @inner
-def mix_transposed(
-    steps: Places, framed: bool, A: Mixing, c: Array, r: Array, own: Array
-) -> None:
+def mix_transposed(steps: Places, framed: bool, A: Mixing, c: Array, r: Array, own: Array) -> None:
     """A' f: writes forces on the tools of forces on mean and edges; uses up c where framed."""
     if framed:
         for edge in range(len(r)):

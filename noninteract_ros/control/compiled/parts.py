@@ -103,6 +103,4 @@ def own_parts(blocks: Array) -> Own:
 @inner
 def mixing_parts(mixers: Array) -> Mixing:
     """Names the parts of the mixing, shape (7, N, h, h)."""
-    return Mixing(
-        mixers[0], mixers[1], mixers[2], mixers[3], mixers[4], mixers[5], mixers[6]
-    )
+    return Mixing(mixers[0], mixers[1], mixers[2], mixers[3], mixers[4], mixers[5], mixers[6])

@@ -52,33 +52,27 @@ class Poses(NamedTuple):
 @compiled
 def gather(
     k: int,
+    blocks: Array,
+    poses: Poses,
     M: Array,
     C: Array,
     J: Array,
     J_rate: Array,
     translation: Array,
     rotation: Array,
-    blocks: Array,
-    jacobians: Array,
-    rates: Array,
-    positions: Array,
-    turns: Array,
 ) -> None:
     """Copies what Pinocchio has of robot k; it fills the upper triangle of M only.
 
     Args:
         k: The robot.
+        blocks: Terms of all robots, shape (6, N, m, m), from M and C on.
+        poses: Frames of all last joints, with twists at the world's origin.
         M: Inertia, shape (n_k, n_k).
         C: Coriolis matrix.
         J: Twists of the joints at the world's origin, shape (6, n_k).
         J_rate: Their time derivatives.
-        translation: Where the frame of the tool's joint is, shape (3,).
+        translation: Where the frame of the last joint is, shape (3,).
         rotation: How it is turned, shape (3, 3).
-        blocks: Terms of all robots, shape (6, N, m, m), from M and C on.
-        jacobians: J of all, shape (N, 6, m).
-        rates: J_rate of all.
-        positions: Translations of all, shape (N, 3).
-        turns: Rotations of all, shape (N, 3, 3).
     """
     size = len(M)
     for i in range(size):
@@ -87,12 +81,12 @@ def gather(
             blocks[1, k, i, j] = C[i, j]
     for i in range(6):
         for j in range(size):
-            jacobians[k, i, j] = J[i, j]
-            rates[k, i, j] = J_rate[i, j]
+            poses.jacobians[k, i, j] = J[i, j]
+            poses.rates[k, i, j] = J_rate[i, j]
     for i in range(3):
-        positions[k, i] = translation[i]
+        poses.positions[k, i] = translation[i]
         for j in range(3):
-            turns[k, i, j] = rotation[i, j]
+            poses.turns[k, i, j] = rotation[i, j]
 
 
 @compiled

@@ -5,6 +5,7 @@ Quaternions (x, y, z, w) and vectors are tuples, matrices are arrays.
 """
 
 import math
+from typing import cast
 
 import numpy as np
 
@@ -16,7 +17,7 @@ Quaternion = tuple[float, float, float, float]
 Vector = tuple[float, float, float]
 
 _A, _B = so3.ANGLE_A.series, so3.ANGLE_B.series
-ANGULAR = np.intp(3)  # Where the angular part of a twist begins.
+ANGULAR = cast(int, np.intp(3))  # Where the angular part of a twist begins.
 _C, _C_SLOPE = so3.ANGLE_C.series, so3.ANGLE_C.slope_series
 
 

@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Compiles the law for this machine: `python -m noninteract_ros.control.compile_ahead`.
+
+A controller does so by itself at its first start, and later ones find the machine code. Who
+prepares a machine can spare it that time.
+"""
+
+from noninteract_ros.control.structure import Structure
+from noninteract_ros.subtasks.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.relative_position import RelativePosition
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.team import Team
+
+
+def compile_ahead() -> None:
+    """Compiles everything, or finds it compiled; the code is the same for all teams."""
+    team = Team([PointMass(mass=1.0).build(name) for name in ("first", "second")])
+    lead = CooperativePosition("cooperative_position").build("lead", team)
+    gap = RelativePosition("relative_position").build("gap", team)
+    Structure.of(team, SubtaskStack(team, [lead, gap]))
+
+
+if __name__ == "__main__":
+    compile_ahead()
