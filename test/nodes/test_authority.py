@@ -19,7 +19,7 @@ def in_force(ros: Ros) -> str:
 
 
 def test_a_subtask_changes_hands_by_topic_in_mid_motion(ros: Ros) -> None:
-    """Autonomy to human and back whenever it comes; the parameter follows, no torque steps."""
+    """Autonomy to human and back whenever it comes; the parameter follows, the limit holds."""
     values = read_parameters(ROOT / "config" / "hand_over.yaml")
     early = {
         "relative": {"hand_over_times": [], "hand_over_to": []},
@@ -39,7 +39,7 @@ def test_a_subtask_changes_hands_by_topic_in_mid_motion(ros: Ros) -> None:
     times, _, _, effort = stack.ear.history(stack.ear.commands)
     assert times[-1] > 0.55
     rates = np.abs(np.diff(effort, axis=0)) / np.diff(times)[:, None]
-    assert rates.max() < LIMIT
+    assert rates.max() <= LIMIT * (1.0 + 1e-9)
     until(lambda: stack.ear.value("controller", "relative led by") == "human", "the diagnostics")
 
 
