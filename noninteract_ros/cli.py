@@ -170,22 +170,40 @@ def repair(
 
 @app.command()
 def check(
-    target: Annotated[str, typer.Argument(help="Name or file of a scenario, or: identities.")],
+    target: Annotated[
+        str, typer.Argument(help="Name or file of a scenario, or: identities, gauntlet.")
+    ],
     others: Annotated[
-        list[str] | None, typer.Argument(help="Scenarios of a check like identities; or all.")
+        list[str] | None,
+        typer.Argument(help="Scenarios of identities; or all. With --json, gauntlet: a file."),
     ] = None,
     samples: Annotated[
         int | None, typer.Option("--states", "--samples", min=1, help="Number of random states.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="JSON instead of tables.")] = False,
+    cases: Annotated[int, typer.Option(min=1, help="Gauntlet: number of cases.")] = 1000,
+    case: Annotated[int | None, typer.Option(min=0, help="Gauntlet: one case in full.")] = None,
+    law: Annotated[list[str] | None, typer.Option(help="Gauntlet: this law only.")] = None,
+    delay: Annotated[int, typer.Option(min=0, help="Gauntlet: age of commands [ticks].")] = 0,
+    drop: Annotated[float, typer.Option(min=0.0, help="Gauntlet: share of states lost.")] = 0.0,
+    rate: Annotated[float, typer.Option(help="Gauntlet: ticks per second.")] = 1000.0,
+    horizon: Annotated[float, typer.Option(help="Gauntlet: time to come to rest [s].")] = 600.0,
 ) -> int:
     """Check a scenario, and the law on its team, without running it."""
     from noninteract_ros.analysis.check import run_check
     from noninteract_ros.analysis.check_report import CheckSettings
+    from noninteract_ros.analysis.gauntlet.settings import LAWS, GauntletSettings
 
-    found = run_check(target, CheckSettings(samples, seed), others or ())
-    if as_json:
+    chosen = GauntletSettings(
+        cases, seed, tuple(law or LAWS), delay, drop, rate, horizon, only=case
+    )
+    others = others or []
+    file = Path(others.pop()) if target == "gauntlet" and as_json and others else None
+    found = run_check(target, CheckSettings(samples, seed, gauntlet=chosen), others)
+    if file:
+        file.write_text(json.dumps(found.as_dict(), indent=2) + "\n")
+    elif as_json:
         print(json.dumps(found.as_dict(), indent=2))
         return 0 if found.passed else 1
     console.print(f"[bold]{found.target}[/]")

@@ -14,7 +14,7 @@ from noninteract_ros.analysis.identities import identities
 from noninteract_ros.analysis.identity_check import check_identities
 from noninteract_ros.analysis.law_probe import LawProbe
 from noninteract_ros.analysis.loops import Loop, closed_loops
-from noninteract_ros.errors import ScenarioError
+from noninteract_ros.errors import NoninteractError, ScenarioError
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario_file import find_scenario, load_scenario
 
@@ -23,10 +23,22 @@ SINGULAR = 1e-6  # smallest singular value below which the subtasks count as dep
 MARGINAL = 1e-9  # growth beyond 1 that rounding may cause where a mode neither grows nor decays
 
 
+def _gauntlet(settings: CheckSettings) -> CheckReport:
+    try:
+        from noninteract_ros.analysis.gauntlet.check import check_gauntlet
+    except ModuleNotFoundError as error:
+        if error.name != "numba":
+            raise
+        needed = "the gauntlet needs Numba: pip install 'noninteract_ros[gauntlet]'"
+        raise NoninteractError(needed) from error
+    return check_gauntlet(settings.gauntlet)
+
+
 # Checks with names of their own; they choose or are given scenarios.
 BUILT_IN: dict[str, Callable[[CheckSettings], CheckReport]] = {
     "identities": check_identities,
     "delay": delay_check,
+    "gauntlet": _gauntlet,
 }
 
 

@@ -2,13 +2,14 @@
 """What a check found: facts and claims, as tables for a terminal and as a dictionary for JSON."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from rich.table import Table
 
 from noninteract_ros.analysis.checks import Check
+from noninteract_ros.analysis.gauntlet.settings import GauntletSettings
 
 
 @dataclass(frozen=True)
@@ -19,11 +20,13 @@ class CheckSettings:
         samples: Number of random states; None leaves it to the check.
         seed: Seed of the random states.
         scenarios: Names or files; none leaves them to the check.
+        gauntlet: Of the gauntlet, which has no states and no scenarios.
     """
 
     samples: int | None = None
     seed: int = 0
     scenarios: tuple[str, ...] = ()
+    gauntlet: GauntletSettings = field(default_factory=GauntletSettings)
 
 
 @dataclass(frozen=True)
