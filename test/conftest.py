@@ -4,6 +4,7 @@
 import fcntl
 import tempfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,8 +25,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
         compile_ahead()
 
 
-@pytest.fixture
-def domain() -> Iterator[int]:
+@contextmanager
+def free_domain() -> Iterator[int]:
     """A ROS domain that no other test on this machine uses at the same time."""
     for number in DOMAINS:
         with Path(tempfile.gettempdir(), f"noninteract_ros_domain_{number}").open("w") as lock:
@@ -36,6 +37,20 @@ def domain() -> Iterator[int]:
             yield number
             return
     raise RuntimeError("all ROS domains for tests are in use")
+
+
+@pytest.fixture
+def domain() -> Iterator[int]:
+    """A ROS domain of its own for a test."""
+    with free_domain() as number:
+        yield number
+
+
+@pytest.fixture(scope="module")
+def module_domain() -> Iterator[int]:
+    """A ROS domain of its own for all tests of a module."""
+    with free_domain() as number:
+        yield number
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ class ConsoleSettings:
         "Rate of references while somebody drives [Hz]", 120.0, minimum=20.0, maximum=1000.0
     )
     hold_timeout: float = key(
-        "Silence of the driving page that lets go for it [s]", 0.2, positive=True, maximum=0.4
+        "Silence of the driving page that lets go for it [s]", 0.15, positive=True, maximum=0.4
     )
     max_speed: float = key("Speed bound along each axis [m/s]", 0.3, positive=True)
     max_turn_rate: float = key("Rate bound about each axis [rad/s]", 0.6, positive=True)
