@@ -77,8 +77,6 @@ class Lead:
         self._subtask = subtask
         self._desired = DesiredMotion(subtask.limits, False, subtask.layout)
         self._desired.rest_at(start)
-        self._grab: int | None = None
-        self._anchor = start
         self._words = LAST_WORDS
 
     @property
@@ -86,23 +84,25 @@ class Lead:
         """Whether it is at rest and has said so."""
         return self._words <= 0
 
-    def step(self, held: Held | None, frame: Array, step: float) -> Reference:
-        """The reference `step` seconds later."""
-        reference = self._desired.advance(self._motion(held, frame), step)
+    @property
+    def position(self) -> Array:
+        """Desired value now."""
+        return self._desired.now.position
+
+    def step(self, held: Held | None, anchor: Array, frame: Array, step: float) -> Reference:
+        """The reference `step` seconds later; drags lead away from the anchor."""
+        reference = self._desired.advance(self._motion(held, anchor, frame), step)
         moves = reference.velocity.any() or reference.acceleration.any()
         self._words = LAST_WORDS if held or moves else self._words - 1
         return reference
 
-    def _motion(self, held: Held | None, frame: Array) -> Motion | None:
-        if not isinstance(held, Drag):
-            self._grab = None
+    def _motion(self, held: Held | None, anchor: Array, frame: Array) -> Motion | None:
         if isinstance(held, Push):
             return Rate(self._rate(held, frame))
         if held is None:
             return None
-        if held.grab != self._grab:
-            self._grab, self._anchor = held.grab, self._desired.now.position
-        return Target(self._target(held, frame), np.zeros(self._subtask.layout.dim))
+        target = self._target(held, anchor, frame)
+        return Target(target, np.zeros(self._subtask.layout.dim))
 
     def _rate(self, held: Push, frame: Array) -> Array:
         subtask, to_frame = self._subtask, so3.matrix(so3.inverse(frame))
@@ -113,9 +113,9 @@ class Lead:
         velocity[subtask.rate_part(held.element)] = part
         return velocity
 
-    def _target(self, held: Drag, frame: Array) -> Array:
+    def _target(self, held: Drag, anchor: Array, frame: Array) -> Array:
         subtask, back = self._subtask, so3.inverse(frame)
-        value, part = self._anchor.copy(), subtask.value_part(held.element)
+        value, part = anchor.copy(), subtask.value_part(held.element)
         by = (so3.matrix(back) @ held.by)[_places(subtask)]
         value[part.start : part.start + len(by)] += by
         if subtask.rotates:
@@ -135,6 +135,9 @@ class Drive:
     def __init__(self, subtasks: Mapping[str, Drivable]) -> None:
         self._subtasks = subtasks
         self._leads: dict[str, Lead] = {}
+        # Where the last grab began: a drag that goes on after a gap goes to the same place.
+        self._grab = -1
+        self._anchor: Array = np.zeros(0)
 
     @property
     def active(self) -> bool:
@@ -162,7 +165,10 @@ class Drive:
         references = {}
         for name, lead in list(self._leads.items()):
             holding = held if held is not None and held.subtask == name else None
-            references[name] = lead.step(holding, scene.frames.get(name, NO_TURN), step)
+            if holding is not None and holding.grab != self._grab:
+                self._grab, self._anchor = holding.grab, lead.position
+            frame = scene.frames.get(name, NO_TURN)
+            references[name] = lead.step(holding, self._anchor, frame, step)
             if lead.silent:
                 del self._leads[name]
         return references

@@ -2,9 +2,11 @@
 """What a person holds in a page, and the dead-man's switch that lets go for them."""
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from noninteract_ros.arrays import Array
+
+FORGIVEN = 1.0  # [s] of silence after which what was held has to be held anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,12 +35,14 @@ class Push:
     Attributes:
         subtask: Subtask that is driven.
         element: Place of the element that is driven.
+        grab: Number of the grab.
         linear: Shape (3,), each within -1 and 1.
         angular: Shape (3,), each within -1 and 1.
     """
 
     subtask: str
     element: int
+    grab: int
     linear: Array
     angular: Array
 
@@ -49,6 +53,9 @@ Held = Drag | Push
 class DeadMan:
     """Keeps what is held for as long as it is said again and again; used by two threads.
 
+    A page that stutters goes on with what it held. After a longer silence nobody knows any more
+    what the person wants: then it has to be let go and held anew.
+
     Args:
         timeout: Silence that lets go [s].
     """
@@ -57,12 +64,21 @@ class DeadMan:
         self._timeout = timeout
         self._lock = threading.Lock()
         self._held: Held | None = None
+        self._grab = self._grabs = 0
         self._said_at = 0.0
 
     def hold(self, held: Held, now: float) -> None:
-        """Somebody holds something, at this time by the monotonic clock [s]."""
+        """Somebody holds something, at this time by the monotonic clock [s].
+
+        What is kept has a number of its own as its grab: pages number theirs as they like.
+        """
         with self._lock:
-            self._held, self._said_at = held, now
+            if self._held is None or held.grab != self._grab:
+                self._grabs += 1
+            elif now - self._said_at > FORGIVEN:
+                return
+            self._grab, self._said_at = held.grab, now
+            self._held = replace(held, grab=self._grabs)
 
     def release(self) -> None:
         """Nobody holds anything."""
@@ -70,8 +86,6 @@ class DeadMan:
             self._held = None
 
     def held(self, now: float) -> Held | None:
-        """What is held now; once let go by silence, it has to be held anew."""
+        """What is held now."""
         with self._lock:
-            if self._held is not None and now - self._said_at > self._timeout:
-                self._held = None
-            return self._held
+            return self._held if now - self._said_at <= self._timeout else None

@@ -77,6 +77,7 @@ KINDS: dict[str, dict[str, Check]] = {
     "push": {
         "subtask": _text,
         "element": _count,
+        "grab": _count,
         "linear": _numbers(3, 1.0),
         "angular": _numbers(3, 1.0),
     },
@@ -143,7 +144,7 @@ def held(said: Said) -> Held | None:
     if said.kind == "push":
         linear = np.array(values["linear"], dtype=float)
         angular = np.array(values["angular"], dtype=float)
-        return Push(values["subtask"], values["element"], linear, angular)
+        return Push(values["subtask"], values["element"], values["grab"], linear, angular)
     return None
 
 

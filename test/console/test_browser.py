@@ -32,7 +32,13 @@ if TYPE_CHECKING:
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 REST = 0.5  # [s] given to the team to come to rest
 STOP = 0.8  # [s] the same after a stop, whose velocities fall by `stop_rate`, here 10 1/s
-PUSH = {"subtask": "cooperative", "element": 0, "linear": [1, 0, 0], "angular": [0, 0, 0]}
+PUSH = {
+    "subtask": "cooperative",
+    "element": 0,
+    "grab": 1,
+    "linear": [1, 0, 0],
+    "angular": [0, 0, 0],
+}
 
 
 @pytest.fixture(scope="module")

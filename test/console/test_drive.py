@@ -39,7 +39,7 @@ def drag(by: list[float], turn: Array = NO_TURN, grab: int = 1, element: int = 0
 
 
 def push(linear: list[float]) -> Push:
-    return Push(NAME, 0, np.array(linear), np.zeros(3))
+    return Push(NAME, 0, 1, np.array(linear), np.zeros(3))
 
 
 def check_bounds(said: list[Reference], subtask: Drivable) -> None:
@@ -93,6 +93,19 @@ def test_taking_hold_again_does_not_jump() -> None:
     middle = said[64].position
     assert said[63].velocity[0] > 0.05  # It was still moving.
     np.testing.assert_allclose(said[-1].position, middle + np.array([0.0, 0.05]), atol=2e-2)
+
+
+def test_a_drag_that_stutters_leads_to_the_same_place() -> None:
+    """The same grab goes on after a gap, however long the team has rested meanwhile."""
+    drive = Drive({NAME: PLANAR})
+    held = drag([0.4, -0.2, 0.0])
+    gap = range(100, 220)
+    desired = START["planar"].copy()
+    for tick in range(600):
+        said = drive.step(None if tick in gap else held, scene(desired), STEP)
+        desired = said[NAME].position if said else desired
+        assert drive.active or tick in gap or tick > 300
+    np.testing.assert_allclose(desired, [1.4, 1.8], atol=1e-12)
 
 
 def test_only_the_element_that_is_held_moves() -> None:

@@ -15,7 +15,13 @@ NO_TURN = [0.0, 0.0, 0.0, 1.0]
 GOOD: dict[str, dict[str, Any]] = {
     "hello": {"version": 1, "token": "abc"},
     "drag": {"subtask": "a", "element": 0, "grab": 1, "by": [0.1, 0, -2], "turn": NO_TURN},
-    "push": {"subtask": "a", "element": 0, "linear": [1, -1, 0.5], "angular": [0, 0, 0]},
+    "push": {
+        "subtask": "a",
+        "element": 0,
+        "grab": 1,
+        "linear": [1, -1, 0.5],
+        "angular": [0, 0, 0],
+    },
     "authority": {"subtask": "a", "source": "hold"},
     "law": {"law": "natural"},
     "gains": {"subtask": "a", "name": "damping", "values": [1.0, 2.5]},

@@ -1,22 +1,50 @@
 # SPDX-License-Identifier: Apache-2.0
 """The dead-man's switch, the driver's seat, and how much a page may send."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from noninteract_ros.console.held import DeadMan, Push
 from noninteract_ros.console.limits import Allowance
 from noninteract_ros.console.seat import Seat
 
-HELD = Push("cooperative", 0, np.ones(3), np.zeros(3))
+HELD = Push("cooperative", 0, 7, np.ones(3), np.zeros(3))
 
 
 def test_silence_lets_go() -> None:
-    """What is not said again within the timeout is let go, and stays so."""
+    """What is not said again within the timeout is let go; a page that stutters goes on."""
     switch = DeadMan(0.2)
     switch.hold(HELD, 1.0)
-    assert switch.held(1.2) is HELD
+    assert switch.held(1.2) is not None
     assert switch.held(1.201) is None
-    assert switch.held(1.1) is None
+    switch.hold(HELD, 1.9)
+    assert switch.held(2.0) is not None
+
+
+def test_after_a_long_silence_it_has_to_be_held_anew() -> None:
+    """The same grab counts no more, however often it is said; another one does."""
+    switch = DeadMan(0.2)
+    switch.hold(HELD, 1.0)
+    for now in (2.1, 2.2, 2.3):
+        switch.hold(HELD, now)
+        assert switch.held(now) is None
+    switch.hold(replace(HELD, grab=8), 2.4)
+    assert switch.held(2.4) is not None
+
+
+def test_a_grab_has_a_number_of_its_own() -> None:
+    """After a release the same page number is another grab, be it another page's."""
+    switch = DeadMan(0.2)
+    grabs = []
+    for now in (1.0, 1.1, 1.2):
+        switch.hold(HELD, now)
+        held = switch.held(now)
+        assert held is not None
+        grabs.append(held.grab)
+        if now == 1.1:
+            switch.release()
+    assert grabs[0] == grabs[1] != grabs[2]
 
 
 def test_only_the_driver_holds() -> None:
@@ -28,7 +56,7 @@ def test_only_the_driver_holds() -> None:
     seat.take(1, 0.0)
     assert seat.hold(1, HELD, 0.0)
     seat.release(2)
-    assert switch.held(0.0) is HELD
+    assert switch.held(0.0) is not None
     seat.release(1)
     assert switch.held(0.0) is None
 
@@ -44,7 +72,7 @@ def test_whoever_loses_the_seat_lets_go() -> None:
     assert not seat.hold(1, HELD, 0.0)
     seat.hold(2, HELD, 0.0)
     seat.leave(1)
-    assert switch.held(0.0) is HELD
+    assert switch.held(0.0) is not None
     seat.leave(2)
     assert switch.held(0.0) is None
     assert seat.driver is None

@@ -17,7 +17,7 @@ from noninteract_ros.console.server import ConsoleServer
 from noninteract_ros.console.settings import ConsoleSettings
 from noninteract_ros.errors import ScenarioError
 
-PUSH = {"subtask": "a", "element": 0, "linear": [1, 0, 0], "angular": [0, 0, 0]}
+PUSH = {"subtask": "a", "element": 0, "grab": 1, "linear": [1, 0, 0], "angular": [0, 0, 0]}
 TOKEN = "a token that is known"
 DEADLINE = 10.0  # [s]
 

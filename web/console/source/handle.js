@@ -15,13 +15,13 @@ export class Handle {
     scene.scene.add(this.controls.getHelper());
     this.start = { position: new THREE.Vector3(), quaternion: new THREE.Quaternion() };
     this.dragging = false;
-    this.grab = 0;
+    this.grab = 1; // Odd numbers; pads and keys have even ones.
     this.controls.addEventListener("change", () => scene.redraw());
     this.controls.addEventListener("dragging-changed", ({ value }) => {
       scene.orbit.enabled = !value;
       this.dragging = value;
       if (!value) return;
-      this.grab += 1;
+      this.grab += 2;
       this.start.position.copy(this.place.position);
       this.start.quaternion.copy(this.place.quaternion);
     });

@@ -74,6 +74,8 @@ export class Inputs {
     this.plane = new Pad(plane);
     this.height = new Pad(height);
     this.keys = new Set();
+    this.grab = 0;
+    this.before = null;
     addEventListener("keydown", (event) => {
       if (!(event.code in KEYS) || typing(event.target)) return;
       if (event.ctrlKey || event.metaKey || event.altKey) return;
@@ -119,6 +121,8 @@ export class Inputs {
         angular[2] = -live(turn);
       }
     }
-    return by && { by, linear: linear.map(within), angular: angular.map(within) };
+    if (by && by !== this.before) this.grab += 2;
+    this.before = by;
+    return by && { by, grab: this.grab, linear: linear.map(within), angular: angular.map(within) };
   }
 }

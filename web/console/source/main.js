@@ -10,6 +10,7 @@ import { Scene } from "./scene.js";
 
 const HOLD_PERIOD = 25; // [ms] at which what is held is said again
 const BEATS = 3; // One in so many periods says that the page is alive.
+const LAPSE = 1000; // [ms]
 const MESHES = 1;
 
 const find = (id) => document.getElementById(id);
@@ -18,7 +19,7 @@ const scene = new Scene(find("canvas"));
 const handle = new Handle(scene);
 const inputs = new Inputs(find("pad-plane"), find("pad-height"));
 const plots = new Plots(find("plots"));
-const state = { hello: null, status: null, me: null, pictures: 0, held: null };
+const state = { hello: null, status: null, me: null, pictures: 0, held: null, since: 0 };
 const link = new Link({ onText, onBytes, onState });
 const send = (message) => link.send(message);
 const panel = new Panel(send);
@@ -105,6 +106,10 @@ function obstacle() {
   return "";
 }
 
+// The program lets go of what a page was silent about for long, though a hand still holds it.
+const lapsed = () =>
+  state.held && !state.status?.held && performance.now() - state.since > LAPSE;
+
 function showStatus() {
   const { status } = state;
   const mine = drives();
@@ -136,7 +141,8 @@ function update() {
   const reason = obstacle();
   const { name, handle: wanted } = state.hello ? chosen() : {};
   handle.show(name, reason ? null : wanted);
-  find("hint").textContent = reason;
+  find("hint").textContent =
+    reason || (lapsed() ? "not held any more: let go and take hold again" : "");
   for (const pad of document.querySelectorAll(".pad")) pad.classList.toggle("able", !reason);
   find("pad-height").hidden = Boolean(wanted) && !wanted.axes.includes("z") && !wanted.rotates;
 }
@@ -159,7 +165,8 @@ setInterval(() => {
     const { name, handle: what } = chosen();
     const to = { subtask: name, element: what.element };
     if (pulled) send({ kind: "drag", ...to, ...pulled });
-    else send({ kind: "push", ...to, linear: pushed.linear, angular: pushed.angular });
+    else send({ kind: "push", ...to, ...pushed, by: undefined });
+    if (!state.held) state.since = performance.now();
     state.held = pulled ? "handle" : pushed.by;
   } else if (state.held) {
     send({ kind: "release" });
