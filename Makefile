@@ -21,10 +21,10 @@ unexport PYTHONPATH AMENT_PREFIX_PATH RMW_IMPLEMENTATION
 SUPPORTED = import sys; print(sys.version_info[:2] in ((3, 11), (3, 12)))
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test lint format bench clean
+.PHONY: help venv demo test lint format bench console console-check clean
 
 help: ## list the targets
-	@sed -n 's/^\([a-z]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 10
+	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 15
 
 $(BIN)/python:
 	$(if $(filter True,$(shell $(PYTHON) -c '$(SUPPORTED)' 2>&1 || :)),,$(error Python 3.11 or 3.12 \
@@ -73,6 +73,22 @@ format: $(VENV)/installed-dev ## rewrite the sources in the project's format
 bench: $(VENV)/installed ## measure the law, the controller and the lockstep
 	$(BIN)/noninteract bench $(ARGS)
 
+CONSOLE := web/console
+STATIC := noninteract_ros/console/static
+
+$(CONSOLE)/node_modules/installed: $(CONSOLE)/package-lock.json
+	cd $(CONSOLE) && npm ci --silent
+	@touch $@
+
+console: $(CONSOLE)/node_modules/installed ## build the console's page from web/console; needs node and npm
+	cd $(CONSOLE) && npm run --silent build
+
+console-check: $(CONSOLE)/node_modules/installed ## whether the page in the package is the one that is built, byte for byte
+	rm -rf build/console-page
+	cd $(CONSOLE) && npm run --silent build -- $(CURDIR)/build/console-page
+	diff --recursive --brief build/console-page $(STATIC)
+
 clean: ## remove all that make has made; recorded runs stay
+	rm -rf $(CONSOLE)/node_modules
 	rm -rf $(VENV) build install log dist *.egg-info .mypy_cache .ruff_cache .pytest_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

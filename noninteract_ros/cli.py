@@ -6,6 +6,8 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -66,6 +68,10 @@ def demo(
     rate_factor: Annotated[float, typer.Option(help="Multiplies the control rate.")] = 1.0,
     out: Annotated[Path | None, typer.Option(help="Output folder.")] = None,
     in_process: Annotated[bool, typer.Option(help="All nodes in this one process.")] = False,
+    with_console: Annotated[
+        bool, typer.Option("--console", help="Lead it yourself, in the browser, until Ctrl-C.")
+    ] = False,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the console.")] = 8090,
 ) -> int:
     """Run a scenario on the full stack, record it, check it and draw it."""
     from noninteract_ros.scenario_file import find_scenario
@@ -73,6 +79,10 @@ def demo(
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     source = find_scenario(scenario)
     folder = out or Path("runs") / f"{source.stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    if with_console:
+        if in_process:
+            raise ScenarioError("--in-process", "given", "nothing, with --console")
+        return _lead(source, folder, duration, rate_factor, port)
     file = _prepare(source, folder.resolve(), duration, rate_factor)
     interrupted = _run(file, folder.resolve(), in_process)
     if interrupted:
@@ -81,8 +91,28 @@ def demo(
     return _report(folder, None)
 
 
-def _prepare(source: Path, folder: Path, duration: float | None, rate_factor: float) -> Path:
-    """Writes the scenario as it is run: paused at the start, with an end, at its own rate."""
+def _lead(
+    source: Path, folder: Path, duration: float | None, rate_factor: float, port: int
+) -> int:
+    """Runs a scenario in real time with the console, which speaks for the human."""
+    from noninteract_ros.nodes.demo import run_with_console
+    from noninteract_ros.scenario_file import for_console, read_parameters
+
+    values = for_console(read_parameters(source), port)
+    file = _prepare(source, folder.resolve(), duration, rate_factor, values)
+    with suppress(KeyboardInterrupt):
+        run_with_console(file, folder.resolve(), partial(console.print, soft_wrap=True))
+    console.print(f"Recorded in {folder}; draw it with: noninteract report {folder}")
+    return 0
+
+
+def _prepare(
+    source: Path, folder: Path, duration: float | None, rate_factor: float, values: Any = None
+) -> Path:
+    """Writes the scenario as it is run: paused at the start, with an end, at its own rate.
+
+    Values of its own, as with a console, have no end but the one that is asked for.
+    """
     from noninteract_ros.nodes.parameter_files import dump
     from noninteract_ros.scenario_file import load_scenario, read_parameters
 
@@ -95,12 +125,13 @@ def _prepare(source: Path, folder: Path, duration: float | None, rate_factor: fl
     changes: dict[str, Any] = {
         "rate": general.rate * rate_factor,
         "duration": duration or general.duration,
-        "end_time": duration or general.duration,
+        "end_time": duration or (0.0 if values else general.duration),
         "start_paused": True,
     }
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / "scenario.yaml"
-    file.write_text(dump({"/**": {"ros__parameters": read_parameters(source) | changes}}))
+    values = values or read_parameters(source)
+    file.write_text(dump({"/**": {"ros__parameters": values | changes}}))
     load_scenario(file)
     return file
 

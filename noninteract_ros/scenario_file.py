@@ -85,6 +85,25 @@ def _merge(old: dict[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
     return merged
 
 
+def for_console(values: Mapping[str, Any], port: int) -> dict[str, Any]:
+    """A scenario whose human is a person at the console.
+
+    It runs in lockstep that keeps to wall time: on a machine that is too slow for its rate it runs
+    slower, and as exactly. Nobody waits for the person, and nobody else speaks for them.
+    """
+    changed = {name: item for name, item in values.items() if name != "haptic"}
+    sources = values.get("lockstep_sources", ())
+    changed |= {
+        "lockstep": True,
+        "real_time": True,
+        "lockstep_sources": [name for name in sources if not name.endswith("/human")],
+        "console": {**values.get("console", {}), "port": port},
+    }
+    for name in values["subtasks"]:
+        changed[name] = {**values[name], "takeover": "shaped"}
+    return changed
+
+
 def config_folders() -> list[Path]:
     """Folders that hold the package's scenarios: a source tree, an installation, a ROS prefix."""
     prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(":")), sys.prefix]

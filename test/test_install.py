@@ -126,6 +126,9 @@ def test_pip_installs_what_ros2_needs(pip_prefix: Path) -> None:
         assert os.access(pip_prefix / "bin" / name, os.X_OK)
     imported = run(pip_prefix / "bin" / "python3", "-P", "-c", PRINT_WHERE_IMPORTED)
     assert Path(imported.strip()).is_relative_to(pip_prefix)
+    static = {file.name for file in (ROOT / PACKAGE / "console" / "static").iterdir()}
+    page = Path(imported.strip()).parent / "console" / "static"
+    assert {file.name for file in page.iterdir()} == static
 
 
 @pytest.mark.parametrize("name", node_programs())

@@ -11,6 +11,7 @@ from noninteract_ros.console.held import Drag, Held, Push
 from noninteract_ros.control.desired import DesiredMotion
 from noninteract_ros.control.inputs import Motion, Rate, Target
 from noninteract_ros.control.reference import Reference
+from noninteract_ros.operator.input_shaping import Workspace
 from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.layout import Layout
 
@@ -30,6 +31,7 @@ class Drivable:
         limits: Bounds of velocity, acceleration and jerk, shape (3, dim).
         speed: Rate of a pad pushed to its end [m/s].
         turn_rate: The same of a rotation [rad/s].
+        workspace: Box that it can be led to, or None.
     """
 
     elements: int
@@ -38,6 +40,7 @@ class Drivable:
     limits: Array
     speed: float
     turn_rate: float
+    workspace: Workspace | None = None
 
     @property
     def layout(self) -> Layout:
@@ -97,12 +100,15 @@ class Lead:
         return reference
 
     def _motion(self, held: Held | None, anchor: Array, frame: Array) -> Motion | None:
+        box = self._subtask.workspace
         if isinstance(held, Push):
-            return Rate(self._rate(held, frame))
+            rate = self._rate(held, frame)
+            return Rate(box.rate(rate, self._desired.now) if box else rate)
         if held is None:
             return None
         target = self._target(held, anchor, frame)
-        return Target(target, np.zeros(self._subtask.layout.dim))
+        still = np.zeros(self._subtask.layout.dim)
+        return Target(box.place(target) if box else target, still)
 
     def _rate(self, held: Push, frame: Array) -> Array:
         subtask, to_frame = self._subtask, so3.matrix(so3.inverse(frame))

@@ -8,39 +8,45 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.console.drive import AXES, NO_TURN, Drivable
-from noninteract_ros.console.settings import ConsoleSettings
 from noninteract_ros.control.impedance import spread
+from noninteract_ros.operator.input_settings import OperatorSettings
+from noninteract_ros.operator.input_shaping import Workspace
 from noninteract_ros.scenario import Scenario
+from noninteract_ros.subtasks.elbow_angle import ElbowAngles
 from noninteract_ros.subtasks.posture import JointSelection
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.team import Team
 
 WORLD = "world"
+POSTURES = (JointSelection, ElbowAngles)
 
 
-def drivables(
-    scenario: Scenario, stack: SubtaskStack, settings: ConsoleSettings
-) -> dict[str, Drivable]:
-    """The subtasks that can be driven; postures are no places, so they have no handle."""
+def drivables(scenario: Scenario, stack: SubtaskStack) -> dict[str, Drivable]:
+    """The subtasks that can be driven; postures are no places, so they have no handle.
+
+    The speeds of the block `operator` bound all of them, its workspace the one that it names.
+    """
+    settings = scenario.operator or OperatorSettings()
     found = {}
     for task in stack.subtasks:
-        if isinstance(task, JointSelection):
+        if isinstance(task, POSTURES):
             continue
         led = scenario.subtasks[task.name].input
         names = ("max_velocity", "max_acceleration", "max_jerk")
         limits = np.array([spread(task, name, getattr(led, name)) for name in names])
         layout = task.layout
-        bound = np.full(layout.dim, settings.max_speed)
-        bound[layout.angular.ravel()] = settings.max_turn_rate
+        bound = np.full(layout.dim, settings.linear_speed)
+        bound[layout.angular.ravel()] = settings.angular_speed
         limits[0] = np.minimum(limits[0], bound)
         found[task.name] = Drivable(
             len(task.elements),
             tuple(task.axes),
             task.rotates,
             limits,
-            settings.max_speed,
-            settings.max_turn_rate,
+            settings.linear_speed,
+            settings.angular_speed,
+            Workspace(settings, task, limits) if task.name == settings.subtask else None,
         )
     return found
 

@@ -26,8 +26,6 @@ class ConsoleSettings:
     hold_timeout: float = key(
         "Silence of the driving page that lets go for it [s]", 0.15, positive=True, maximum=0.4
     )
-    max_speed: float = key("Speed bound along each axis [m/s]", 0.3, positive=True)
-    max_turn_rate: float = key("Rate bound about each axis [rad/s]", 0.6, positive=True)
     max_message: int = key("Largest message of a page [bytes]", 4096, minimum=256)
     max_message_rate: float = key(
         "Messages per second that a page may send in the long run [Hz]", 150.0, minimum=50.0

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs a scenario on the full stack and leaves its recording behind."""
 
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -57,7 +58,7 @@ def run_demo(
                 stack = Processes(names, scenario_file, out)
             monitor.wait_until_ready([*names, "recorder"], START_TIMEOUT)
             monitor.begin(START_TIMEOUT)
-            _follow(monitor, progress)
+            _follow(monitor, progress, STALL_TIMEOUT if not scenario.console else math.inf)
         finally:
             progress(monitor.time(), "ending")
             if stack is not None:
@@ -66,8 +67,32 @@ def run_demo(
             rclpy.try_shutdown()
 
 
-def _follow(monitor: Monitor, progress: Callable[[float, str], None]) -> None:
-    """Until the team is at its end; a run that does not move is given up."""
+def run_with_console(scenario_file: Path, out: Path, say: Callable[[str], None]) -> None:
+    """Runs a scenario that has a console, and says where that is once the team moves.
+
+    Args:
+        scenario_file: As `run_demo` has it; without an `end_time` it runs until it is interrupted.
+        out: Output folder.
+        say: Told lines for the user.
+
+    Raises:
+        StackError: A program ended or does not answer.
+        KeyboardInterrupt: The user ended the run; the recording is complete up to then.
+    """
+    log, waiting = out / "logs" / "operator_console.log", True
+
+    def progress(now: float, state: str) -> None:
+        nonlocal waiting
+        if waiting and state == "running":
+            waiting = False
+            say(log.read_text().strip())
+            say("Ctrl-C ends it.")
+
+    run_demo(scenario_file, out, False, progress)
+
+
+def _follow(monitor: Monitor, progress: Callable[[float, str], None], patience: float) -> None:
+    """Until the team is at its end; a run that stands still for too long [s] is given up."""
     last, moved_at = -1.0, time.monotonic()
     while not monitor.finished():
         monitor.spin(0.1)
@@ -75,6 +100,6 @@ def _follow(monitor: Monitor, progress: Callable[[float, str], None]) -> None:
         progress(now, "running")
         if now > last:
             last, moved_at = now, time.monotonic()
-        elif time.monotonic() - moved_at > STALL_TIMEOUT:
+        elif time.monotonic() - moved_at > patience:
             told = {name: status.text for name, status in monitor.status.items()}
             raise StackError(f"the team stands still at {now:.3f} s: {told}")

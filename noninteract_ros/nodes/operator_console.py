@@ -55,7 +55,7 @@ class OperatorConsole(ScenarioNode):
         # Lockstep waits for its sources; a person is none of those that can be waited for.
         awaited = self.scenario.general.lockstep_sources if self.lockstep else ()
         self._awaited = [name for name in stack.names if f"{name}/human" in awaited]
-        found = drivables(self.scenario, stack, self.settings)
+        found = drivables(self.scenario, stack)
         self._drivables = {name: found[name] for name in found if name not in self._awaited}
         # A node without an executor: what it hears is taken by hand, when it is wanted.
         self._listener = Node(
@@ -152,10 +152,27 @@ class OperatorConsole(ScenarioNode):
             if said.kind in ("stop", "reset"):
                 self._switch.release()
                 self._drive.drop()
-            self._calls.ask(said, partial(self._answer, page, said))
+            if said.kind == "reset" and not self._status.stopped:
+                self._reset(page, said)
+            else:
+                self._calls.ask(said, partial(self._answer, page, said))
         self._calls.poll()
         if self._server.pages:
             self._calls.read(READ_PERIOD)
+
+    def _reset(self, page: int, said: Said) -> None:
+        """Resets between a stop and a resume: else the controller leads the team back again."""
+
+        def resume(done: bool, text: str) -> None:
+            self._calls.ask(Said("resume", {}), lambda *_: self._answer(page, said, done, text))
+
+        def reset(done: bool, text: str) -> None:
+            if done:
+                self._calls.ask(said, resume)
+            else:
+                self._answer(page, said, done, text)
+
+        self._calls.ask(Said("stop", {}), reset)
 
     def _answer(self, page: int, said: Said, done: bool, text: str) -> None:
         self._server.tell(page, {"kind": "answer", "ok": done, "text": text})

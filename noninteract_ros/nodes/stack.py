@@ -35,7 +35,8 @@ def programs_of(scenario: Scenario) -> list[str]:
     """Nodes that a scenario needs, besides the recorder."""
     names = ["robot_team", "controller"]
     names += ["haptic_emulator"] if scenario.haptic else []
-    return names + (["relative_planner"] if scenario.planner else [])
+    names += ["relative_planner"] if scenario.planner else []
+    return names + (["operator_console"] if scenario.console else [])
 
 
 class Stack(Protocol):

@@ -32,7 +32,6 @@ FLAGS = (
     " --enable-unsafe-swiftshader"
 )
 SLOW = 1e-3  # [m/s] below which the team is at rest
-FRAME = 1.0 / 60.0  # [s]
 # A gamepad that tests can press; nothing is held while it is null.
 GAMEPAD = "window.pad = null; navigator.getGamepads = () => [window.pad];"
 
@@ -71,7 +70,7 @@ def scenario() -> dict[str, Any]:
         robot_2={"initial_position": [-0.5, -0.5]},
         cooperative={"takeover": "shaped"},
         relative={"takeover": "shaped"},
-        console={"port": 0},
+        console={"port": 0, "frame_rate": 20.0},
     )
 
 
@@ -95,7 +94,7 @@ class Show:
 
     @contextmanager
     def page(
-        self, drives: bool = True, port: int = 0, size: tuple[int, int] = (1280, 800)
+        self, drives: bool = True, port: int = 0, size: tuple[int, int] = (1024, 700)
     ) -> Iterator[Page]:
         """A page that is open and knows the team; it drives, where asked for."""
         context = self.browser.new_context(viewport={"width": size[0], "height": size[1]})
@@ -133,15 +132,16 @@ class Show:
     def rest_after(self, release: Callable[[], None]) -> float:
         """Time of the team from a release at a good speed to rest [s], by the states' stamps.
 
-        The team's time is never faster than the wall's, so that a slow machine makes it shorter.
+        It counts from when the release is done. The team's time is never faster than the wall's,
+        so that a slow machine makes it shorter.
         """
         assert self.speed() > 0.1
-        began = self.ear.now
         release()
+        began = self.ear.now
         self.rests()
         times, _, v, _ = self.ear.history(self.ear.states)
         moving = (np.abs(v).max(axis=1) >= SLOW) & (times >= began)
-        return float(times[moving][-1] - began)
+        return float(times[moving][-1] - began) if moving.any() else 0.0
 
     def stays(self, seconds: float = 0.3) -> bool:
         """Whether the team rests for so long of its own time [s]."""
