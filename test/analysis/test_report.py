@@ -33,7 +33,7 @@ def test_a_report_holds_metrics_checks_and_figures(tmp_path: Path) -> None:
     assert stored["passed"] is True
     assert [check["name"] for check in stored["checks"]] == [c.name for c in report.checks]
     assert stored["closed_form"]["relative"]["max_deviation_m"] < 2e-3
-    assert set(stored["comparison"]["moved_m"]) == {"noninteracting", "natural"}
+    assert set(stored["comparison"]["moved_m"]) == {"energy_gated", "natural"}
     text = shown(report)
     for word in ("closed_form.relative", "passed", "n/a", "max error [m]", "natural [m]"):
         assert word in text
