@@ -93,6 +93,16 @@ def test_the_paper_without_ros_meets_its_closed_form_in_order_1() -> None:
     assert min(row[3] for row in rows) >= 0.0
 
 
+def test_what_states_of_different_times_cost() -> None:
+    """In proportion to the age with constant velocity; measured acceleration costs far less."""
+    printed = run(ROOT / "examples" / "states_at_different_times.py").splitlines()[1:]
+    same, *aged = (numbers(line) for line in printed)
+    assert same[1] == same[2] < 1e-6
+    for age, constant, accelerated in aged:
+        assert constant == pytest.approx(aged[0][1] * age, rel=0.05)
+        assert accelerated < 0.02 * constant
+
+
 def test_what_crosses_over_on_arms_falls_with_the_tick() -> None:
     """Holding the torque over a tick lets micrometres through, half as many at twice the rate."""
     rows = [
