@@ -20,7 +20,7 @@ from noninteract_ros.errors import RecordingError
 from noninteract_ros.subtasks.subtask import Subtask
 
 FEW = 3  # elements that can be told apart in one figure by colour
-BEFORE = 0.1  # share of the time after its start that a storage function is shown before it
+LEGEND_WIDTH = 80  # letters in a line of a legend; a line's sample takes six
 
 
 def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
@@ -78,7 +78,8 @@ def tracking_figure(recorded: Recorded, subtask: str) -> Figure:
         axes = rows[column]
         draw_one = _draw_few if len(task.elements) <= FEW else _draw_many
         draw_one(axes, tracking, actual[:, :, column], desired[:, :, column], task.elements)
-        axes.set_ylabel(f"{_quantity(subtask, task.elements)}\n{axis} [m]")
+        named = f"{axis} [{task.unit}]" if task.unit == "m" else f"[{task.unit}]"
+        axes.set_ylabel(f"{_quantity(subtask, task.elements)}\n{named}")
         axes.margins(x=0.0)
     if task.rotates:
         _draw_angles(rows[-1], tracking, task)
@@ -86,7 +87,9 @@ def tracking_figure(recorded: Recorded, subtask: str) -> Figure:
     figure.align_ylabels(rows)
     # Beside the curves there is no telling where room is; above the axes there always is.
     handles, labels = rows[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=min(len(labels), 4))
+    columns = min(len(labels), max(2, LEGEND_WIDTH // (6 + max(map(len, labels)))))
+    columns -= columns % 2 if len(labels) > columns else 0  # Pairs stay one above the other.
+    figure.legend(handles, labels, loc="outside upper right", ncols=columns)
     return figure
 
 
@@ -96,7 +99,7 @@ def _draw_angles(axes: Axes, tracking: Tracking, task: Subtask) -> None:
     angles = np.linalg.norm(e[:, task.layout.angular], axis=2)
     lines = axes.plot(tracking.t, angles, color=COLOURS[1], linewidth=1.0)
     lines[0].set_label("angle error")
-    axes.set_ylabel("orientation\nerror [rad]")
+    axes.set_ylabel(f"{'orientation' if task.axes else task.name}\nerror [rad]")
     axes.margins(x=0.0)
 
 
@@ -165,7 +168,11 @@ def storage_figure(recorded: Recorded) -> Figure:
     rates.set_xlabel("time since the subtask's start [s]")
     for axes in (storages, rates):
         axes.axhline(0.0, color="black", linewidth=0.6, zorder=1)
-        axes.legend(loc="best", ncols=1 + len(names) // 5)
+        if len(names) <= FEW:
+            axes.legend(loc="best")
+    if len(names) > FEW:
+        handles, labels = storages.get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=3)
     storages.set_xlim(0.0, _shown(recorded))
     return figure
 

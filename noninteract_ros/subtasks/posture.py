@@ -12,7 +12,7 @@ from noninteract_ros.schema import key
 from noninteract_ros.subtasks.edges import NO_SUBTASKS
 from noninteract_ros.subtasks.mixing import JointMixing
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
-from noninteract_ros.team.team import Team, TeamState
+from noninteract_ros.team.team import PRISMATIC, Team, TeamState
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,11 @@ class Posture:
             if joint not in able:
                 raise ScenarioError(path, repr(joint), one_of(able, joint))
         places = [able[joint] for joint in self.joints]
-        return JointSelection(name, self.joints, places, team.n)
+        selection = JointSelection(name, self.joints, places, team.n)
+        numbers = [team.model.getJointId(joint) for joint in self.joints]
+        slides = {team.model.joints[number].shortname() in PRISMATIC for number in numbers}
+        selection.unit = "m, rad" if len(slides) == 2 else "m" if slides == {True} else "rad"
+        return selection
 
 
 class JointSelection(Subtask):

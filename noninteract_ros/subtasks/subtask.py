@@ -39,6 +39,7 @@ class Subtask(ABC):
         axes: Axes, out of x, y and z, that each element has.
         rotates: Whether each element has a rotation.
         angles: Whether positions are angles [rad]: those a whole turn apart are the same.
+        unit: Unit of the positions.
         frame: Orientation of the team that other subtasks can be seen from, or None; its
             `evaluate` returns one rotation with its differentials, see `parts.Rows`.
         mixing: How it mixes what each robot does, or None; see `mixing`.
@@ -51,6 +52,7 @@ class Subtask(ABC):
     axes: tuple[str, ...]
     rotates: bool = False
     angles: bool = False
+    unit: str = "m"
     frame: Part | None = None
     mixing: Mixing | None = None
 
