@@ -10,26 +10,25 @@ class Fade:
     """Adds what was in force before a change, less what is in force after it, for a while.
 
     Args:
-        dim: Number of coordinates.
         duration: How long it takes [s].
     """
 
-    def __init__(self, dim: int, duration: float) -> None:
+    def __init__(self, duration: float) -> None:
         self._duration = duration
-        self._difference: Array = np.zeros(dim)
+        self._difference: Array = np.zeros(0)
+        self.forget()
+
+    def forget(self) -> None:
+        """Ends at once."""
         self._start = -np.inf
 
     def begin(self, now: float, difference: Array) -> None:
         """Starts with a difference, shape (n,), at a time [s]."""
         self._difference, self._start = difference, now
 
-    def forget(self) -> None:
-        """Ends at once."""
-        self._start = -np.inf
-
-    def at(self, now: float) -> Array:
-        """What is left, shape (n,), at a time [s]; exactly zero after the duration."""
+    def added_to(self, wanted: Array, now: float) -> Array:
+        """With what is left of the difference; after the duration the very same array, (n,)."""
         progress = (now - self._start) / self._duration
         if progress >= 1.0:
-            return np.zeros_like(self._difference)
-        return self._difference * (1.0 - progress) ** 2 * (1.0 + 2.0 * progress)
+            return wanted
+        return wanted + self._difference * (1.0 - progress) ** 2 * (1.0 + 2.0 * progress)

@@ -8,15 +8,15 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.continuity import Continuity
-from noninteract_ros.control.decoupling import TaskError, commanded_acceleration
+from noninteract_ros.control.decoupling import TaskError
 from noninteract_ros.control.energy import Energy, energy
 from noninteract_ros.control.energy_gate import EnergyGate, Moment
 from noninteract_ros.control.energy_tank import TankSettings
-from noninteract_ros.control.fade import Fade
 from noninteract_ros.control.force_goal import ForceGoals
-from noninteract_ros.control.gated_law import decoupling, gated_acceleration, without_law
+from noninteract_ros.control.gated_law import decoupling, without_law
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
 from noninteract_ros.control.joint_safety import JointSafety, SafetyReport
+from noninteract_ros.control.law_in_force import LawInForce
 from noninteract_ros.control.outside import Outside
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.singularity import SingularityGuard, best_regularity
@@ -70,13 +70,11 @@ class TeamController:
             for task, settings in zip(stack.subtasks, inputs, strict=True)
         }
         self._mode = Mode(law, stack_impedance(stack.subtasks, impedances))
-        self._left: Mode | None = None
-        self._stop_rate = stop_rate
-        self._fade = Fade(team.n, transition_time)
         self._continuity = Continuity(team, state_timeout)
         self.gate = EnergyGate(team, stack, tank)
         self.outside = Outside(team, measured, tank.observer_gain)
         self._springs, self._goals = WaitingSprings(transition_time), ForceGoals(team.n)
+        self._law = LawInForce(self.gate, self._goals, transition_time, stop_rate)
         self._view: TeamView = Structure.of(team, stack) or DenseView(team, stack)
         self._guard = SingularityGuard(team, safety, best_regularity(team, stack))
         self._safety = JointSafety(team, safety)
@@ -134,7 +132,7 @@ class TeamController:
     def reset(self) -> None:
         """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
         self._continuity.forget()
-        self._fade.forget()
+        self._law.fade.forget()
         self.gate.restart()
         self.outside.reset()
         self._goals.forget()
@@ -144,7 +142,7 @@ class TeamController:
             item.reset()
 
     def _change(self, mode: Mode) -> None:
-        self._left = self._left or self._mode
+        self._law.left = self._law.left or self._mode
         self._mode = mode
 
     def step(
@@ -170,8 +168,9 @@ class TeamController:
         elapsed = self._continuity.elapsed(now)
         step = 0.0 if restarted else elapsed
         # At the tick of a stop the inputs still count, so that the torque starts without a step.
-        stopped = self._mode.stopped and (self._left is None or self._left.stopped)
-        if restarted or stopped or (self._left and self._left.stopped):
+        left = self._law.left
+        stopped = self._mode.stopped and (left is None or left.stopped)
+        if restarted or stopped or (left and left.stopped):
             self._rest_at(seen.task.x)
         if restarted:
             self._guard.reset()
@@ -190,7 +189,9 @@ class TeamController:
         if share == 1.0:
             self.gate.book(moment, self._mode.law, applied)
         recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
-        acceleration, wanted = self._blended(seen, moment, share, recovery)
+        acceleration, wanted = self._law.blended(
+            self._mode, self._view, seen, moment, share, recovery
+        )
         asked = seen.dynamics.torque(v, wanted)
         torque, safety = self._safety.protect(q, v, asked, seen.state.g, elapsed)
         self._remember(moment, torque, acceleration, share, safety)
@@ -275,50 +276,6 @@ class TeamController:
     def _rest_at(self, x: Array) -> None:
         for item, part in zip(self.inputs.values(), self.stack.value_slices, strict=True):
             item.rest_at(x[part])
-
-    def _blended(
-        self, seen: Seen, moment: Moment, share: float, recovery: Array
-    ) -> tuple[Array, Array]:
-        """Task and joint acceleration of law and recovery together, shape (n,) each."""
-        dynamics, v = seen.dynamics, seen.state.v
-        if share == 0.0:  # The law is not even defined at a singularity; what fades starts over.
-            self._left = None
-            self._fade.forget()
-            return dynamics.acceleration_of(v, recovery), recovery
-        acceleration = self._acceleration(seen, moment)
-        wanted = dynamics.joint_acceleration(v, acceleration)
-        if share == 1.0:
-            return acceleration, wanted
-        wanted = share * wanted + (1.0 - share) * recovery
-        return dynamics.acceleration_of(v, wanted), wanted
-
-    def _acceleration(self, seen: Seen, moment: Moment) -> Array:
-        """Task acceleration in force, with the bump of the last change fading out."""
-        v, now = seen.state.v, moment.now
-        wanted = self._wanted(self._mode, v, moment)
-        if self._left is not None:
-            impedance = self._left.impedance
-            left = self._view.again(seen, impedance.inertias)
-            error = replace(moment.error, goal=self._goals.wanted(impedance))
-            added = decoupling(left, error, impedance)
-            was = replace(moment, error=error, dynamics=left, impedance=impedance, added=added)
-            before = self._wanted(self._left, v, was) + self._fade.at(now)
-            self._fade.begin(now, before - wanted)
-            self._left = None
-        fading = self._fade.at(now)
-        return wanted + fading if fading.any() else wanted
-
-    def _wanted(self, mode: Mode, v: Array, moment: Moment) -> Array:
-        dynamics, error = moment.dynamics, moment.error
-        if mode.stopped:
-            return dynamics.acceleration_of(v, -self._stop_rate * v)
-        if mode.law == "energy_gated":
-            return gated_acceleration(
-                dynamics, error, mode.impedance, moment.added, self.gate.tank
-            )
-        if mode.law == "noninteracting":
-            return moment.added.acceleration
-        return commanded_acceleration(mode.law, dynamics, error, mode.impedance)
 
     def _error(self, seen: Seen, led: Sequence[Led]) -> TaskError:
         position = np.concatenate([item.reference.position for item in led])

@@ -61,6 +61,7 @@ class WaitingSprings:
         if self._start is None or self._goal is None:
             return impedance
         progress = min(1.0, self._progress + step / self._duration)
+        self._waits = False
         if tank is not None:
             cost = _stored(self._at(progress), e) - _stored(impedance, e)
             share = affordable(tank, tank.grip * cost, settings)

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The acceleration that is asked for: of the law in force, of the one before it, of a recovery."""
+
+from dataclasses import replace
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.decoupling import commanded_acceleration
+from noninteract_ros.control.energy_gate import EnergyGate, Moment
+from noninteract_ros.control.fade import Fade
+from noninteract_ros.control.force_goal import ForceGoals
+from noninteract_ros.control.gated_law import decoupling, gated_acceleration
+from noninteract_ros.control.team_view import Seen, TeamView
+from noninteract_ros.control.tick import Mode
+
+
+class LawInForce:
+    """Evaluates modes at a state, so that a change of mode has no bump.
+
+    Args:
+        gate: The energy account with its gates.
+        goals: Forces that subtasks are to press with.
+        transition_time: How long a change fades in [s].
+        stop_rate: Decay rate of the velocity after a stop [1/s].
+
+    Attributes:
+        left: Mode that a change has left since the last tick, or None.
+        fade: What is left of the bump of the last change.
+    """
+
+    def __init__(
+        self, gate: EnergyGate, goals: ForceGoals, transition_time: float, stop_rate: float
+    ) -> None:
+        self._gate, self._goals, self._stop_rate = gate, goals, stop_rate
+        self.fade = Fade(transition_time)
+        self.left: Mode | None = None
+
+    def blended(
+        self,
+        mode: Mode,
+        view: TeamView,
+        seen: Seen,
+        moment: Moment,
+        share: float,
+        recovery: Array,
+    ) -> tuple[Array, Array]:
+        """Task and joint acceleration of law and recovery together, shape (n,) each.
+
+        Args:
+            mode: Mode in force.
+            view: Evaluates the state with other desired inertias.
+            seen: The state.
+            moment: The same as the law sees it.
+            share: Share of the law.
+            recovery: Joint acceleration of the recovery from a singularity, shape (n,).
+        """
+        dynamics, v = seen.dynamics, seen.state.v
+        if share == 0.0:  # The law is not even defined at a singularity; what fades starts over.
+            self.left = None
+            self.fade.forget()
+            return dynamics.acceleration_of(v, recovery), recovery
+        acceleration = self._acceleration(mode, view, seen, moment)
+        wanted = dynamics.joint_acceleration(v, acceleration)
+        if share == 1.0:
+            return acceleration, wanted
+        wanted = share * wanted + (1.0 - share) * recovery
+        return dynamics.acceleration_of(v, wanted), wanted
+
+    def _acceleration(self, mode: Mode, view: TeamView, seen: Seen, moment: Moment) -> Array:
+        """Task acceleration in force, with the bump of the last change fading out."""
+        v, now = seen.state.v, moment.now
+        wanted = self._wanted(mode, v, moment)
+        if self.left is not None:
+            impedance = self.left.impedance
+            dynamics = view.again(seen, impedance.inertias)
+            error = replace(moment.error, goal=self._goals.wanted(impedance))
+            added = decoupling(dynamics, error, impedance)
+            was = replace(moment, error=error, dynamics=dynamics, impedance=impedance, added=added)
+            before = self._wanted(self.left, v, was)
+            self.fade.begin(now, self.fade.added_to(before, now) - wanted)
+            self.left = None
+        return self.fade.added_to(wanted, now)
+
+    def _wanted(self, mode: Mode, v: Array, moment: Moment) -> Array:
+        """What a mode asks for by itself."""
+        dynamics, error, added = moment.dynamics, moment.error, moment.added
+        if mode.stopped:
+            return dynamics.acceleration_of(v, -self._stop_rate * v)
+        if mode.law == "energy_gated":
+            return gated_acceleration(dynamics, error, mode.impedance, added, self._gate.tank)
+        if mode.law == "noninteracting":
+            return added.acceleration
+        return commanded_acceleration(mode.law, dynamics, error, mode.impedance)
