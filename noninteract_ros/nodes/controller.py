@@ -9,23 +9,21 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
 from std_srvs.srv import Trigger
-from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds
-from noninteract_ros.control.inputs import HORIZON, SOURCES, Force, Motion, Rate, Target
-from noninteract_ros.control.reference import Reference
+from noninteract_ros.control.inputs import HORIZON, SOURCES, Force, Motion
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.authority import AuthorityTopics
 from noninteract_ros.nodes.chronicle import Chronicle
 from noninteract_ros.nodes.controller_parameters import LiveParameters
 from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder, state_lead
-from noninteract_ros.nodes.messages import Level, Marker, ParsedReference, SubtaskCodec
+from noninteract_ros.nodes.messages import Level, SubtaskCodec
 from noninteract_ros.nodes.node import ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
+from noninteract_ros.nodes.source_topics import listen
 from noninteract_ros.nodes.team_link import TeamLink
 from noninteract_ros.nodes.telemetry import Telemetry
 
@@ -72,45 +70,17 @@ class Controller(ScenarioNode):
         for subtask in stack.subtasks:
             codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes, subtask.rotates)
             for source in SOURCES:
-                self._listen(codec, source)
+                listen(self, codec, source, self._take_input)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self.create_service(Trigger, "~/resume", self._on_resume)
         self.create_service(Trigger, "~/refill", self._on_refill)
         if self.lockstep:
             self.every(WATCH_PERIOD, self._answer_if_complete)
 
-    def _listen(self, codec: SubtaskCodec, source: str) -> None:
-        """Subscribes to everything that one source can send to one subtask."""
-        topic = f"{codec.name}/{source}"
-
-        def take(kind: str, parse: Callable[[Any], Any], message: Any) -> None:
-            parsed = parse(message)
-            self._post(partial(self._receive, f"{topic}/{kind}", codec.name, source, parsed))
-
-        def target(message: PoseStamped) -> tuple[int, Motion]:
-            stamp, position = codec.target(message)
-            return stamp, Target(position, np.zeros(codec.layout.dim))
-
-        def rate(message: TwistStamped) -> tuple[int, Motion]:
-            stamp, velocity = codec.rate(message)
-            return stamp, Rate(velocity)
-
-        def force(message: WrenchStamped) -> tuple[int, Force]:
-            stamp, wanted = codec.force(message)
-            return stamp, Force(wanted)
-
-        def reference(data: bytes) -> tuple[int, Motion | None]:
-            return _reference(codec.decode(data), codec.layout.dim)
-
-        self.subscribe(
-            MultiDOFJointTrajectory,
-            f"{topic}/reference",
-            partial(take, "reference", reference),
-            raw=True,
-        )
-        self.subscribe(PoseStamped, f"{topic}/target_pose", partial(take, "target_pose", target))
-        self.subscribe(TwistStamped, f"{topic}/target_twist", partial(take, "target_twist", rate))
-        self.subscribe(WrenchStamped, f"{topic}/wrench", partial(take, "wrench", force))
+    def _take_input(
+        self, topic: str, subtask: str, source: str, parsed: tuple[int, Motion | Force | None]
+    ) -> None:
+        self._post(partial(self._receive, topic, subtask, source, parsed))
 
     def _post(self, work: Callable[[], None]) -> None:
         """Has the thread of the core do something before its next tick."""
@@ -285,19 +255,6 @@ class Controller(ScenarioNode):
             age = now - self._state_at
             waiting = self._missing if now - self._waiting_since > WAIT_SHOWN else []
         return self._chronicle.status(self._now, age, waiting, self._watch.absent)
-
-
-def _reference(parsed: ParsedReference | Marker, dim: int) -> tuple[int, Motion | None]:
-    """What a source asks for: a motion, a set-point where it gives no velocity, or nothing.
-
-    A motion without acceleration is followed by its position and velocity alone.
-    """
-    if isinstance(parsed, Marker):
-        return parsed.stamp_ns, None
-    if parsed.velocity is None:
-        return parsed.stamp_ns, Target(parsed.position, np.zeros(dim))
-    acceleration = np.zeros(dim) if parsed.acceleration is None else parsed.acceleration
-    return parsed.stamp_ns, Reference(parsed.position, parsed.velocity, acceleration)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
