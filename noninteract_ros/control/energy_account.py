@@ -60,11 +60,16 @@ class Account:
         return self.whole - self.start - came_in
 
     @property
+    def imbalance(self) -> float:
+        """What the residual is beyond the loss that was booked, zero but for rounding [J]."""
+        return self.residual + self.tank.lost
+
+    @property
     def bound(self) -> float:
-        """Largest residual that rounding alone can make [J]."""
+        """Largest imbalance that rounding alone can make [J]."""
         return ROUNDING * self.turnover
 
     @property
     def sound(self) -> bool:
-        """Whether the residual is what rounding can make; not so, if it is no number."""
-        return self.residual <= self.bound
+        """Whether the imbalance is what rounding can make; not so, if it is no number."""
+        return abs(self.imbalance) <= self.bound

@@ -104,5 +104,5 @@ def unsound(account: Account) -> str:
     """What is wrong with an account that does not balance, or an empty text."""
     if account.sound:
         return ""
-    residual, bound = account.residual, account.bound
-    return f"the energy account does not balance: {residual:.3g} J, rounding makes {bound:.1g} J"
+    found, bound = account.imbalance, account.bound
+    return f"the energy account does not balance: {found:.3g} J, rounding makes {bound:.1g} J"

@@ -1,17 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """The team's energy account over DDS: what it tells at the door, and how it is refilled."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 from harness import Ros, merged, paper, until
+from rcl_interfaces.srv import SetParameters
+from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from repository import ROOT
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
-from noninteract_ros.nodes.team_energy import LABELS
+from noninteract_ros.nodes.team_energy import LABELS, unsound
 
 
 def door(**changes: Any) -> dict[str, Any]:
@@ -52,6 +55,30 @@ def test_the_door_s_account_is_told_tick_by_tick(ros: Ros) -> None:
     assert max(abs(row["received"] - row["measured"]) for row in rows) < 0.3 * largest
     assert ros.call(Trigger, "controller/refill").success
     until(lambda: accounts.rows[-1]["refilled"] > 0.0, "the refilled tank")
+
+
+def test_an_account_that_does_not_balance_is_said_to(ros: Ros) -> None:
+    """Energy out of nothing is an error in the diagnostics, with its size and its bound."""
+    stack = ros.stack(paper()).begin()
+    stack.run_until(0.2)
+    core = stack.nodes["controller"].core
+    account = core.gate.account
+    assert unsound(account) == ""
+    forged = replace(account, start=account.start - 0.01)
+    assert unsound(forged).startswith("the energy account does not balance: 0.0")
+    core.gate._account = replace(core.gate.account, start=-1.0)
+    until(stack.ear.says("controller", "does not balance"), "the error")
+    assert stack.ear.status["controller"][0] == 2
+
+
+def test_the_tank_s_levels_change_while_it_runs(ros: Ros) -> None:
+    """A live key of the tank is in force at the next tick."""
+    stack = ros.stack(paper()).begin()
+    value = Parameter("tank.capacity", value=3.0).to_parameter_msg()
+    request = SetParameters.Request(parameters=[value])
+    assert ros.call(SetParameters, "controller/set_parameters", request).results[0].successful
+    core = stack.nodes["controller"].core
+    until(lambda: core.gate.settings.capacity == 3.0, "the new capacity")
 
 
 def test_the_paper_s_experiment_stays_open(ros: Ros) -> None:
