@@ -13,6 +13,7 @@ import numpy as np
 
 from noninteract_ros.analysis.check_report import CheckReport, CheckSettings, Section
 from noninteract_ros.analysis.checks import Check, at_least, at_most
+from noninteract_ros.analysis.link_metrics import SLACK
 from noninteract_ros.arrays import Array
 from noninteract_ros.operator.link_settings import LinkSettings
 from noninteract_ros.rehearsal import Rehearsal
@@ -24,7 +25,6 @@ DELAYS = (0.0, 0.01, 0.05, 0.1, 0.2)  # [s] one way
 DURATION = 4.0  # [s] until the operator of the base begins to come back
 LATE = 1.0  # [s] at the end in which the hand has to be at rest
 RESTLESS = 0.05  # [m/s] root mean square of the hand's velocity beyond which it is not
-SLACK = 1e-3  # [J] that the device's force does within a tick before it is observed
 BOX = {"kind": "rigid_object", "mass": 2.0, "stiffness": 3000.0, "damping": 40.0}
 PLACES: dict[str, dict[str, Any]] = {"free": {}, "wall": {}, "carrying": {"box": BOX}}
 

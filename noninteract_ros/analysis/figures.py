@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 
 from noninteract_ros.analysis.arm_figures import limits_figure
 from noninteract_ros.analysis.energy_account import Account, account
-from noninteract_ros.analysis.link_figures import link_account, link_figure
+from noninteract_ros.analysis.link_figures import link_figure
+from noninteract_ros.analysis.link_metrics import link_account
 from noninteract_ros.analysis.paths import paths_figure
 from noninteract_ros.analysis.recorded import Recorded, Tracking, select
 from noninteract_ros.analysis.rendering import Film, motion_figure, save_animation

@@ -5,25 +5,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from noninteract_ros.analysis.link_metrics import operator_net
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.series import LabelledSeries
 from noninteract_ros.analysis.style import COLOURS, new_figure, styled
-from noninteract_ros.arrays import Array
 
 PORTS = (("operator", "hand"), ("team", "team"))
-
-
-def link_account(recorded: Recorded) -> LabelledSeries | None:
-    """The account as it was published; None where the run has no link or did not record it."""
-    haptic = recorded.scenario.haptic
-    if haptic is None or not recorded.has(topic := f"{haptic.subtask}/link"):
-        return None
-    return recorded.run.labelled(topic)
-
-
-def operator_net(account: LabelledSeries) -> Array:
-    """Energy that the operator has put into the link less what came out, shape (n,) [J]."""
-    return account["operator_in"] - account["operator_out"]
 
 
 @styled

@@ -17,6 +17,7 @@ from noninteract_ros.analysis.comparison import Comparer
 from noninteract_ros.analysis.energy_account import energy_metrics
 from noninteract_ros.analysis.holding import recorded_holding
 from noninteract_ros.analysis.influences import Influence, influences
+from noninteract_ros.analysis.link_metrics import link_metrics
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import RecordingError
@@ -71,7 +72,10 @@ def measure(recorded: Recorded, other_laws: bool = True) -> Findings:
         energy_checks += found
     metrics |= {"closed_form": closed, **comparison.metrics, "energy": energies}
     metrics["diagnostics"], diagnostic_checks = diagnostics_metrics(recorded)
+    link, link_checks = link_metrics(recorded)
+    metrics |= link
     checks += [*closed_checks, *comparison.checks, *energy_checks, *diagnostic_checks]
+    checks += link_checks
     return Findings(metrics, checks)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figure of a link's energy account."""
+"""A link's energy account in the report: figure and check."""
 
 from pathlib import Path
 
@@ -8,7 +8,8 @@ import pytest
 from rehearsed import record, scenario_values
 
 from noninteract_ros.analysis.figures import draw
-from noninteract_ros.analysis.link_figures import link_account, link_figure, operator_net
+from noninteract_ros.analysis.link_figures import link_figure
+from noninteract_ros.analysis.link_metrics import link_account, link_metrics, operator_net
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.recording import RunWriter
 from noninteract_ros.nodes.messages import EnergyCodec
@@ -17,7 +18,7 @@ from noninteract_ros.operator.bilateral import LinkAccount
 KIND = "std_msgs/msg/Float64MultiArray"
 
 
-def recorded(folder: Path, budget: float) -> Recorded:
+def recorded(folder: Path, budget: float, drawn: float = 0.5) -> Recorded:
     """A run with a link and ten accounts."""
     values = scenario_values(haptic__hand_mass=0.5)
     values["link"] = {"delay": 0.1, "reserve": 0.25}
@@ -25,7 +26,7 @@ def recorded(folder: Path, budget: float) -> Recorded:
 
     def accounts(writer: RunWriter) -> None:
         for n in range(10):
-            account = np.array([0.1 * n, 2.0 * n, 0.5 * n, 1.5 * n, 0.1 * n, 0.3, budget, 4.0])
+            account = np.array([0.1 * n, 2.0 * n, drawn * n, 1.5 * n, 0.1 * n, 0.3, budget, 4.0])
             stamp = 10**8 * n
             writer.add("/team/cooperative/link", KIND, stamp, stamp, codec.encode(account))
 
@@ -47,6 +48,17 @@ def test_the_figure_shows_ports_balance_and_budgets(tmp_path: Path, budget: floa
     bound = {str(line.get_label()): line.get_ydata() for line in balance.lines}["bound"]
     np.testing.assert_allclose(bound, -0.25)
     assert np.isfinite(budgets.lines[1].get_ydata()).all() == np.isfinite(budget)
+
+
+@pytest.mark.parametrize(("drawn", "kept"), [(0.5, True), (2.02, True), (2.03, False)])
+def test_a_link_that_gives_more_than_its_reserve_fails_the_report(
+    tmp_path: Path, drawn: float, kept: bool
+) -> None:
+    """9 times (2 - drawn) J is the least balance; the reserve is 0.25 J."""
+    metrics, (check,) = link_metrics(recorded(tmp_path, 0.5, drawn))
+    assert check.passed is kept
+    assert metrics["link"]["least_operator_net_J"] == pytest.approx(min(0.0, 9 * (2.0 - drawn)))
+    assert metrics["link"]["lost"] == 4
 
 
 def test_it_is_drawn_where_there_is_a_link_and_only_there(tmp_path: Path) -> None:

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a link between an operator's device and the team must show: it gave nothing away."""
+
+from typing import Any
+
+from noninteract_ros.analysis.checks import Check, at_least
+from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.series import LabelledSeries
+from noninteract_ros.arrays import Array
+
+SLACK = 1e-3  # [J] that the device's force does within a tick before it is observed
+
+
+def link_account(recorded: Recorded) -> LabelledSeries | None:
+    """The account as it was published; None where the run has no link or did not record it."""
+    haptic = recorded.scenario.haptic
+    if haptic is None or not recorded.has(topic := f"{haptic.subtask}/link"):
+        return None
+    return recorded.run.labelled(topic)
+
+
+def operator_net(account: LabelledSeries) -> Array:
+    """Energy that the operator has put into the link less what came out, shape (n,) [J]."""
+    return account["operator_in"] - account["operator_out"]
+
+
+def link_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
+    """Energies at the end, and whether the operator ever drew more than the reserve.
+
+    A link without a passivity layer promises nothing: its energies are told, not judged.
+    """
+    account, link = link_account(recorded), recorded.scenario.link
+    if account is None or link is None:
+        return {}, []
+    least = float(operator_net(account).min())
+    names = ("operator_in", "operator_out", "team_in", "team_out")
+    energies = {f"{name}_J": float(account[name][-1]) for name in names}
+    metrics = {**energies, "least_operator_net_J": least, "lost": int(account["lost"][-1])}
+    if link.passivity == "none":
+        return {"link": metrics}, []
+    bound = -link.reserve - SLACK
+    return {"link": metrics}, [at_least("link.operator_net", least, bound, "J")]
