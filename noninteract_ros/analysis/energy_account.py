@@ -157,6 +157,13 @@ def _rubbing(recorded: Recorded) -> str:
     return FRICTION if recorded.team.friction.any() else ""
 
 
+def _linked(recorded: Recorded, subtask: str) -> str:
+    """Why changes of the reference's speed supply a subtask untold, or an empty text."""
+    haptic = recorded.scenario.haptic
+    over_link = recorded.scenario.link and haptic and haptic.subtask == subtask
+    return "references over a link have no acceleration" if over_link else ""
+
+
 def _growth(recorded: Recorded, subtask: str, found: Account) -> tuple[float | None, str]:
     """Largest growth over any time with a still reference and nothing that acts from outside."""
     if reason := _crossing(recorded) or _rubbing(recorded):
@@ -187,7 +194,7 @@ def _against_supply(
     unseen = set(recorded.scenario.robots) - set(recorded.scenario.general.force_sensors)
     if loaded and unseen:
         return 0.0, 0.0, "the controller has no force sensors on every robot"
-    if reason := _late(recorded) or _rubbing(recorded):
+    if reason := _late(recorded) or _rubbing(recorded) or _linked(recorded, subtask):
         return 0.0, 0.0, reason
     excess = mismatch = 0.0
     told = ~jumps(recorded.task(subtask).layout, found.desired)

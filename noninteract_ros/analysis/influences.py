@@ -95,6 +95,6 @@ def _changes(recorded: Recorded) -> list[Influence]:
             texts["the controller was stopped"] = None
         for name, spec in recorded.scenario.subtasks.items():
             led_by = values.get(f"{name} led by", spec.input.authority).split(",")[0]
-            if led_by != spec.input.authority:
+            if led_by not in (spec.input.authority, *spec.input.hand_over_to):
                 texts[f"authority over {name} changed to {led_by}"] = None
     return [Influence("", text) for text in texts]
