@@ -295,6 +295,7 @@ def describe(
 
 def _measure(parts: Sequence[str], settings: "BenchSettings") -> list["Row"]:
     from noninteract_ros.analysis import bench as measures
+    from noninteract_ros.analysis.bench_law import law_rows
     from noninteract_ros.analysis.bench_teams import bench_teams
     from noninteract_ros.nodes import bench as nodes
 
@@ -311,7 +312,7 @@ def _measure(parts: Sequence[str], settings: "BenchSettings") -> list["Row"]:
                 console.print(f"{name} is left out: {error}")
                 continue
             if "law" in parts:
-                rows += measures.law_rows(name, material, settings.ticks)
+                rows += law_rows(name, material, settings.ticks)
             if "node" in parts and name not in teams:
                 rows += nodes.node_rows(name, values, material, settings.ticks)
         if "lockstep" in parts:

@@ -3,7 +3,7 @@
 
 from typing import Any
 
-COUNTS = (2, 8, 32)
+COUNTS = (2, 8, 16, 32)
 START = (0.0, -0.6, 0.0, -2.2, 0.0, 1.7, 0.8)
 FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 

@@ -5,6 +5,7 @@ A controller does so by itself at its first start, and later ones find the machi
 prepares a machine can spare it that time.
 """
 
+from noninteract_ros.control.compiled_layout import CompiledLayout
 from noninteract_ros.control.structure import Structure
 from noninteract_ros.subtasks.cooperative_position import CooperativePosition
 from noninteract_ros.subtasks.relative_position import RelativePosition
@@ -18,7 +19,9 @@ def compile_ahead() -> None:
     team = Team([PointMass(mass=1.0).build(name) for name in ("first", "second")])
     lead = CooperativePosition("cooperative_position").build("lead", team)
     gap = RelativePosition("relative_position").build("gap", team)
-    Structure.of(team, SubtaskStack(team, [lead, gap]))
+    stack = SubtaskStack(team, [lead, gap])
+    Structure.of(team, stack)
+    CompiledLayout(stack.layout)
 
 
 if __name__ == "__main__":

@@ -72,6 +72,7 @@ class Impedance:
         goal: Force to press with, shape (n,) [N]; empty without any.
         goal_gain: Rates of its regulation, shape (n,) [1/s].
         goal_bound: Bounds of what regulation adds, shape (n,) [N].
+        linear: Whether no force is bounded; the same numbers are then found with less work.
     """
 
     stiffness: Array
@@ -82,6 +83,10 @@ class Impedance:
     goal: Array = field(default_factory=_none)
     goal_gain: Array = field(default_factory=_none)
     goal_bound: Array = field(default_factory=_none)
+    linear: bool = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "linear", bool(np.isinf(self.max_force).all()))
 
     @property
     def has_goal(self) -> bool:
@@ -91,7 +96,7 @@ class Impedance:
     def force(self, e: Array) -> Array:
         """h(e), the exact gradient of the potential, shape (n,) [N; N m]."""
         linear = self.stiffness * e
-        return linear / np.sqrt(1.0 + self._overload(linear))
+        return linear if self.linear else linear / np.sqrt(1.0 + self._overload(linear))
 
     def potential(self, e: Array) -> Array:
         """V(e) by coordinate, shape (n,) [J]: K e^2 / 2 where linear.
@@ -100,6 +105,8 @@ class Impedance:
         The three of a rotation have the angle |e| under the root, and add up to its potential.
         """
         linear = self.stiffness * e
+        if self.linear:
+            return 0.5 * linear * e
         return linear * e / (1.0 + np.sqrt(1.0 + self._overload(linear)))
 
     def _overload(self, linear: Array) -> Array:

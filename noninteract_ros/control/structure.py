@@ -56,6 +56,7 @@ class Structure:
 
     def evaluate(self, q: Array, v: Array, inertias: DesiredInertias) -> Seen:
         """Everything at a state, with the subtasks' desired inertias."""
+        v = np.array(v)  # To numba an array that is only for reading is another kind.
         x, dynamics = self._found(q, v, inertias)
         state = DeferredState(self._team, q, v, dynamics.g)
         return Seen(state, DeferredTask(x, dynamics), dynamics)

@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.control.compiled_layout import CompiledLayout
 from noninteract_ros.control.desired import DesiredMotion
 from noninteract_ros.control.hand_over import HandOvers
 from noninteract_ros.control.impedance import spread
@@ -89,7 +90,7 @@ class SubtaskInput:
         self._timeout = settings.timeout
         names = ("max_velocity", "max_acceleration", "max_jerk")
         limits = np.array([spread(subtask, name, getattr(settings, name)) for name in names])
-        self._layout = subtask.layout
+        self._layout = CompiledLayout(subtask.layout)
         self._desired = DesiredMotion(limits, settings.takeover == "direct", self._layout)
         self._max_force = spread(subtask, "max_wrench", settings.max_wrench)
         self._max_force_rate = spread(subtask, "max_wrench_rate", settings.max_wrench_rate)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.control.compiled_layout import CompiledLayout
 from noninteract_ros.control.continuity import Continuity
 from noninteract_ros.control.decoupling import TaskError
 from noninteract_ros.control.energy import Energy, energy
@@ -64,6 +65,7 @@ class TeamController:
         measured: bool = True,
     ) -> None:
         self.team, self.stack = team, stack
+        self._layout = CompiledLayout(stack.layout)
         self._settings = list(impedances)
         self.inputs: Mapping[str, SubtaskInput] = {
             task.name: SubtaskInput(task, settings)
@@ -192,7 +194,7 @@ class TeamController:
         acceleration, wanted = self._law.blended(
             self._mode, self._view, seen, moment, share, recovery
         )
-        asked = seen.dynamics.torque(v, wanted)
+        asked = seen.dynamics.torque(seen.state.v, wanted)
         torque, safety = self._safety.protect(q, v, asked, seen.state.g, elapsed)
         self._remember(moment, torque, acceleration, share, safety)
         self._regulate(seen, wrenches, step, held=share < 1.0 or safety.acted)
@@ -282,7 +284,7 @@ class TeamController:
         velocity = np.concatenate([item.reference.velocity for item in led])
         acceleration = np.concatenate([item.reference.acceleration for item in led])
         force = np.concatenate([item.force for item in led])
-        e = self.stack.difference(seen.task.x, position)
+        e = self._layout.difference(seen.task.x, position)
         e_rate = seen.dynamics.velocity(seen.state.v) - velocity
         goal = self._goals.wanted(self._mode.impedance)
         return TaskError(e, e_rate, velocity, acceleration, force, goal)

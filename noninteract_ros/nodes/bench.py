@@ -14,11 +14,11 @@ from rclpy.serialization import deserialize_message, serialize_message
 from noninteract_ros.analysis.bench import (
     BenchSettings,
     Material,
-    PinocchioTerms,
     Row,
     Timed,
     take_turns,
 )
+from noninteract_ros.analysis.bench_law import PinocchioTerms
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
 from noninteract_ros.nodes.bench_programs import (

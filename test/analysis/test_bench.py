@@ -45,7 +45,8 @@ def test_law_and_node_are_timed_for_every_scenario(
     figures = run(monkeypatch, tmp_path, *parts, "--ticks", "12")
     rows = rows_of(figures)
     for name in ("paper", "formation", "planar_arms"):
-        assert rows[f"law, {name}"]["floor"] == f"Pinocchio's terms, {name}"
+        for what in ("law", "whole step"):
+            assert rows[f"{what}, {name}"]["floor"] == f"Pinocchio's terms, {name}"
         assert rows[f"controller node, {name}"]["count"] == 12
     assert {"cpu", "cores", "python", "load average before", "load average after"} <= set(
         figures["machine"]
