@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -168,10 +168,9 @@ class EnergyGate:
         tank = step(account.tank, interval, refilling)
         tank = revalue(tank, moment.potential())  # Other gains than at the last tick are paid.
         tank = tank if law == GATED else observed(tank, SIGMAS[law])
-        sizes = (*(abs(item) for item in astuple(interval)), abs(received), kinetic)
-        added = (
-            abs(account.whole) + abs(account.received) + abs(tank.brought) + tank.lost + sum(sizes)
-        )
+        stored = abs(account.whole) + abs(account.received) + abs(tank.brought) + tank.lost
+        moved = abs(received) + abs(interval.kinetic_jump) + abs(interval.input_work) + kinetic
+        added = stored + moved + abs(interval.impedance_work) + abs(interval.decoupling_work)
         if not math.isfinite(added):
             return False
         self._account = replace(

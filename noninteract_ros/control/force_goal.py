@@ -10,6 +10,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.impedance import Impedance
+from noninteract_ros.last_call import LastCall
 
 
 class ForceGoals:
@@ -21,6 +22,7 @@ class ForceGoals:
 
     def __init__(self, dim: int) -> None:
         self._integral: Array = np.zeros(dim)
+        self._has_goal = LastCall(_has_goal)
 
     def forget(self) -> None:
         """The integrals start at zero."""
@@ -28,7 +30,7 @@ class ForceGoals:
 
     def wanted(self, impedance: Impedance) -> Array | None:
         """Force to add now, shape (n,) [N]; None where no subtask has a goal."""
-        if not impedance.has_goal:
+        if not self._has_goal(impedance):
             return None
         return impedance.goal + np.where(impedance.goal_gain > 0.0, self._integral, 0.0)
 
@@ -45,3 +47,7 @@ class ForceGoals:
         change = 0.0 if held else gain * step * (impedance.goal - pressing)
         whole = np.clip(self._integral + change, -bound, bound)
         self._integral = np.where(gain > 0.0, whole, 0.0)
+
+
+def _has_goal(impedance: Impedance) -> bool:
+    return bool(impedance.goal.any() or impedance.goal_gain.any())

@@ -88,11 +88,6 @@ class Impedance:
     def __post_init__(self) -> None:
         object.__setattr__(self, "linear", bool(np.isinf(self.max_force).all()))
 
-    @property
-    def has_goal(self) -> bool:
-        """Whether a subtask is to press."""
-        return bool(self.goal.any() or self.goal_gain.any())
-
     def force(self, e: Array) -> Array:
         """h(e), the exact gradient of the potential, shape (n,) [N; N m]."""
         linear = self.stiffness * e
