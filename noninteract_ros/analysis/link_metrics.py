@@ -38,5 +38,6 @@ def link_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
     metrics = {**energies, "least_operator_net_J": least, "lost": int(account["lost"][-1])}
     if link.passivity == "none":
         return {"link": metrics}, []
+    metrics["least_device_budget_J"] = float(account["device_budget"].min())
     bound = -link.reserve - SLACK
     return {"link": metrics}, [at_least("link.operator_net", least, bound, "J")]

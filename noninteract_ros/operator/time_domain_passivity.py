@@ -6,7 +6,8 @@ given and answers with a velocity. Each observes the energy at its port, tick by
 displacement that really happened, and gives away no more than the other end has announced
 (`energy_budget.py`): it takes the part along the given flow off its answer. What the team's end
 takes up is announced only as far as it was put in before. So the operator gets no more energy out
-than was put in and the reserve, whatever the team does.
+than was put in and the reserve, whatever the team does. What the hand does within a tick, after
+the device's end has chosen its force, may overdraw that by a debt, which its next energy pays.
 """
 
 import math

@@ -59,6 +59,7 @@ def test_a_link_that_gives_more_than_its_reserve_fails_the_report(
     assert check.passed is kept
     assert metrics["link"]["least_operator_net_J"] == pytest.approx(min(0.0, 9 * (2.0 - drawn)))
     assert metrics["link"]["lost"] == 4
+    assert metrics["link"]["least_device_budget_J"] == pytest.approx(0.3)
 
 
 def test_it_is_drawn_where_there_is_a_link_and_only_there(tmp_path: Path) -> None:
