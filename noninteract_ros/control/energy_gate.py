@@ -9,6 +9,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.command_log import Command, CommandLog
+from noninteract_ros.control.compiled_layout import CompiledLayout
 from noninteract_ros.control.decoupling import TaskDynamics, TaskError
 from noninteract_ros.control.energy_account import Account
 from noninteract_ros.control.energy_tank import (
@@ -75,6 +76,7 @@ class EnergyGate:
 
     def __init__(self, team: Team, stack: SubtaskStack, settings: TankSettings) -> None:
         self._team, self._stack = team, stack
+        self._layout = CompiledLayout(stack.layout)
         self._still = np.zeros(team.n)
         self._number = 0
         self._commands = CommandLog()
@@ -237,7 +239,7 @@ class EnergyGate:
         # A torque held over the tick does the work of a task force held with J of its own tick.
         moved = command.dynamics.velocity(turned) - travelled
         held = float(command.dynamics.g @ turned) - (lifted - self._lifted)
-        arrived = last.impedance.potential(self._stack.difference(moment.x, foretold))
+        arrived = last.impedance.potential(self._layout.difference(moment.x, foretold))
         e_rate = moment.error.e_rate
         rate_arrived = e_rate + moment.error.reference_velocity - foretold_rate
         jump = 0.0 if (rate_arrived == e_rate).all() else kinetic - moment.kinetic(rate_arrived)

@@ -127,7 +127,9 @@ class SubtaskInput:
         source = self.sources.get(self.authority)
         motion = self._fresh(source.motion(now), now) if source else None
         force = self._fresh(source.force(now), now) if source else None
-        self._force = self._shaped(force[1].force if force else np.zeros_like(self._force), step)
+        if force or self._force.any():
+            wanted = force[1].force if force else np.zeros_like(self._force)
+            self._force = self._shaped(wanted, step)
         reference = self._desired.advance(self._as_of(now, *motion) if motion else None, step)
         silent = source is not None and motion is None and force is None
         return Led(reference, self._force, self.authority, silent)

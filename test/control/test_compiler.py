@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Machine code is kept for the next process, and never longer than the sources it came from."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from noninteract_ros.control.compiled import compiler
+
+INNER = "from compiler import inner\n\n@inner\ndef value():\n    return {}\n"
+OUTER = (
+    "from compiler import compiled\nfrom inside import value\n\n"
+    "@compiled\ndef doubled():\n    return 2 * value()\n"
+)
+ASK = "from outside import doubled; print(doubled(), *doubled.stats.cache_hits.values())"
+
+
+def answer(folder: Path) -> list[int]:
+    """What the compiled function gives, and 1 for each time that kept code was found."""
+    command = [sys.executable, "-c", ASK]
+    run = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
+    return [int(word) for word in run.stdout.split()]
+
+
+def test_code_is_kept_until_what_it_calls_changes(tmp_path: Path) -> None:
+    """A change in the file of an inner function reaches the kept code of its caller."""
+    shutil.copy(Path(str(compiler.__file__)), tmp_path / "compiler.py")
+    (tmp_path / "outside.py").write_text(OUTER)
+    (tmp_path / "inside.py").write_text(INNER.format(1))
+    assert answer(tmp_path) == [2]
+    assert answer(tmp_path) == [2, 1]
+    (tmp_path / "inside.py").write_text(INNER.format(5))
+    assert answer(tmp_path) == [10]
