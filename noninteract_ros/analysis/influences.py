@@ -91,6 +91,8 @@ def _changes(recorded: Recorded) -> list[Influence]:
         start = values.get("last start", "none")
         if start not in ("none", FIRST_START):
             texts[f"the controller started anew: {start}"] = None
+        if (changed := values.get("changed parameters", "none")) != "none":
+            texts[f"parameters were changed: {changed}"] = None
         if status["message"] == "stopped":
             texts["the controller was stopped"] = None
         for name, spec in recorded.scenario.subtasks.items():

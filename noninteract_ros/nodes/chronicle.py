@@ -26,6 +26,7 @@ class Chronicle:
     Attributes:
         cycle_times: How long the last answers took [s].
         problem: Why the team is held still, or an empty text.
+        changed: Parameters that were changed since the start.
     """
 
     def __init__(self, node: ScenarioNode, core: TeamController, telemetry: Telemetry) -> None:
@@ -36,6 +37,7 @@ class Chronicle:
         self._conditions: list[str] = []
         self.cycle_times: deque[float] = deque(maxlen=1000)
         self.problem = ""
+        self.changed: set[str] = set()
 
     def note(self, now: float, tick: Tick) -> None:
         """Logs what changed: a new start, a source that went silent or came back, limits."""
@@ -99,6 +101,7 @@ class Chronicle:
             "time [s]": now,
             "state age [s]": age,
             "last start": self._restart or "none",
+            "changed parameters": ", ".join(sorted(self.changed)) or "none",
         }
         if self.cycle_times:
             times = 1e6 * np.array(self.cycle_times)

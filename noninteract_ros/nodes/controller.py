@@ -59,7 +59,7 @@ class Controller(ScenarioNode):
         self._now = 0.0
         self._telemetry = Telemetry(self, team, stack)
         self._chronicle = Chronicle(self, self.core, self._telemetry)
-        self._live = LiveParameters(self, self.core, self._post)
+        self._live = LiveParameters(self, self.core, self._post, self._chronicle.changed)
         self._authority = AuthorityTopics(self, stack.names)
         self._watch = SourceWatch(
             general.lockstep_sources if self.lockstep else (),

@@ -23,12 +23,17 @@ class LiveParameters:
         node: The controller's node.
         core: The controller.
         post: Has the thread of the core run something.
+        changed: Takes the names of parameters that were changed.
     """
 
     def __init__(
-        self, node: ScenarioNode, core: TeamController, post: Callable[[Callable[[], None]], None]
+        self,
+        node: ScenarioNode,
+        core: TeamController,
+        post: Callable[[Callable[[], None]], None],
+        changed: set[str],
     ) -> None:
-        self._core, self._post = core, post
+        self._core, self._post, self._changed = core, post, changed
         self._rules = {
             name: (hint, rule) for name, hint, rule, _ in node.scenario.parameters() if rule.live
         }
@@ -54,6 +59,7 @@ class LiveParameters:
             tank.check()
         except ScenarioError as error:
             return SetParametersResult(successful=False, reason=str(error))
+        self._changed |= {item.name for item in parameters} & self._rules.keys()
         for name, settings in impedances.items():
             if settings != self._impedances[name]:
                 changes.append(partial(self._core.set_impedance, name, settings))

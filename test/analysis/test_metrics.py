@@ -186,6 +186,7 @@ def test_in_wall_time_only_what_holds_there_is_claimed(tmp_path: Path) -> None:
         ("running", {"relative led by": "hold"}, "authority over relative changed to hold"),
         ("running", {"last start": "robot_1/x jumped by 0.3"}, "started anew: robot_1/x jumped"),
         ("stopped", {}, "the controller was stopped"),
+        ("running", {"changed parameters": "relative.stiffness"}, "changed: relative.stiffness"),
     ],
 )
 def test_changes_at_run_time_are_named(

@@ -69,6 +69,8 @@ def test_law_and_gains_change_without_a_bump(ros: Ros) -> None:
     stack.run_until(stack.ear.now + 0.15)
     names = ("law", "cooperative.stiffness", "relative.inertia")
     assert parameters(ros, *names) == ["paper", [10.0, 10.0], [1.5, 1.5]]
+    told = stack.ear.value("controller", "changed parameters")
+    assert told == "cooperative.stiffness, law, relative.damping, relative.inertia"
     steps = torque_steps(stack)
     # At once, four times the stiffness would be a step of 3 * 25 N/m * 0.9 m, shared by two.
     assert steps[5:].max() < 1.0
