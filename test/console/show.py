@@ -11,6 +11,7 @@ import socket
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -87,7 +88,10 @@ class Show:
         self.browser = browser
         self.ear: Ear = ros.ear(values)
         programs.environment |= {"NONINTERACT_CONSOLE_TOKEN": TOKEN}
-        programs.start_all(NAMES, values, self.ear)
+        for name in NAMES:
+            programs.start(name, values)
+        for name in NAMES:  # Each has a deadline of its own: together they start slowly.
+            until(partial(self.ear.status.__contains__, name), f"{name} speaks")
         found = until(lambda: re.search(r"http://127\.0\.0\.1:(\d+)/", programs.log(NAMES[3])))
         self.port = int(found[1])
         until(lambda: len(self.ear.states) > 10, "the team moves")

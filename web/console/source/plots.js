@@ -9,7 +9,16 @@ const MARGIN = 44; // [px] for numbers
 const short = (value) =>
   value === 0 ? "0" : Math.abs(value) >= 1e4 || Math.abs(value) < 1e-3
     ? value.toExponential(0)
-    : String(Number(value.toPrecision(3)));
+    : String(Number(value.toPrecision(2)));
+
+// A name has the same colour in every plot.
+const names = [];
+
+function colourOf(name) {
+  const whose = name.split(" ")[0];
+  if (!names.includes(whose)) names.push(whose);
+  return colour(names.indexOf(whose) + name.endsWith("σ"));
+}
 
 class Plot {
   constructor(parent, title, floor) {
@@ -66,18 +75,16 @@ class Plot {
       pen.fillText(short(value), MARGIN - 4, Math.max(6, Math.min(height - 6, y(value))));
     }
     this.words.replaceChildren();
-    let number = 0;
     for (const [name, points] of this.series) {
-      pen.strokeStyle = colour(number);
+      pen.strokeStyle = colourOf(name);
       pen.lineWidth = 1.5;
       pen.beginPath();
       for (const [time, value] of points) pen.lineTo(x(time), y(value));
       pen.stroke();
       const word = document.createElement("span");
-      word.style.color = colour(number);
+      word.style.color = colourOf(name);
       word.textContent = `${name} ${points[points.length - 1][1].toPrecision(3)}`;
       this.words.append(word);
-      number += 1;
     }
   }
 }
