@@ -147,7 +147,7 @@ def test_what_is_held_leads_until_it_is_let_go(
     shoot(page, hold.__name__)
     assert show.rest_after(release) < REST
     moved = show.centre() - start
-    assert moved[1] < -0.05
+    assert moved[1] < -0.02  # What it takes to come to that speed and to rest.
     assert abs(moved[0]) < 1e-3
     assert show.stays()
 
@@ -182,7 +182,7 @@ def test_a_page_that_is_lost_lets_go(
     with ExitStack() as left:
         page, end = lose(show, left)
         press_pad(page, 0.0, 0.4)
-        show.moves(0.19)
+        show.moves(0.19, page)
         assert show.rest_after(end) < REST
         assert show.stays()
 
@@ -310,7 +310,7 @@ def test_one_drives_and_the_other_watches(show: Show, page: Page) -> None:
         assert show.stays()
         page.mouse.up()
         press_pad(second, 0.0, 0.4)
-        show.moves()
+        show.moves(pressed=second)
         second.mouse.up()
         show.rests()
 
@@ -375,6 +375,6 @@ def test_it_works_on_a_phone(show: Show) -> None:
             assert box["y"] + box["height"] <= 844.0
         shoot(page, "phone_scrolled")
         press_pad(page, 0.4, 0.0)
-        show.moves()
+        show.moves(pressed=page)
         page.mouse.up()
         show.rests()
