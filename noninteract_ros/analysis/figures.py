@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from noninteract_ros.analysis.account_figure import account_figure
 from noninteract_ros.analysis.arm_figures import limits_figure
 from noninteract_ros.analysis.energy_account import Account, account
 from noninteract_ros.analysis.link_figures import link_figure
@@ -45,6 +46,10 @@ def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
             missing.append(str(error))
     try:
         files.append(save(storage_figure(recorded), folder / "fig4_storage.png"))
+    except RecordingError as error:
+        missing.append(str(error))
+    try:
+        files.append(save(account_figure(recorded), folder / "fig5_energy.png"))
     except RecordingError as error:
         missing.append(str(error))
     files.append(save(paths_figure(recorded), folder / "paths.png"))

@@ -150,6 +150,12 @@ class Recorded:
         """Whether the recording has messages of a topic, given by the end of its name."""
         return any(name.endswith(f"/{topic}") for name in self.run.topics)
 
+    def team_topic(self, name: str) -> str:
+        """Full name of a topic of the team itself, which some subtask's may end with as well."""
+        ends = (topic for topic in self.run.topics if topic.endswith("/joint_states"))
+        states = min(ends, key=len)  # A robot may have one of its own, in a deeper namespace.
+        return states.removesuffix("joint_states") + name
+
     def motion(self, topic: str, subtask: str) -> Motion:
         """State, desired motion or references of a subtask.
 

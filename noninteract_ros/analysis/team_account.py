@@ -1,0 +1,151 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The energy account that the controller told of, for the port where its team is touched."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from noninteract_ros.analysis.checks import Check, at_least, at_most, not_applicable
+from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.arrays import Array
+from noninteract_ros.errors import RecordingError
+
+TOPIC = "energy"
+GATED = "energy_gated"
+# Shares of the largest sum that rounding may add to the residual at a tick.
+ROUNDING = 64.0 * float(np.finfo(float).eps)
+LABELS = (
+    "storage",
+    "supplied",
+    "dissipated",
+    "demand",
+    "tank",
+    "reserve",
+    "sigma",
+    "grip",
+    "residual",
+    "received",
+    "measured",
+    "brought",
+    "credit",
+    "refilled",
+    "lost",
+    "account",
+)
+
+
+@dataclass(frozen=True)
+class TeamAccount:
+    """The account over time, shape (n,) each.
+
+    Attributes:
+        t: Time of the run [s].
+        storage: T + nu U of the errors [J].
+        supplied: Power at the physical port [W].
+        dissipated: Power that the impedance takes [W].
+        demand: Power that complete decoupling would inject [W].
+        tank: Energy in the tank [J].
+        reserve: Energy in the reserve [J].
+        sigma: Gate of the decoupling.
+        grip: Gate of the impedance.
+        residual: What all storage grew by beyond all that came in [J].
+        received: Work of the surroundings since the account began [J].
+        measured: Integral of `supplied` since then [J].
+        brought: Energy that moved references brought since then [J].
+        credit: Energy granted for them since then [J].
+        refilled: Energy granted by an operator since then [J].
+        lost: Energy withheld or spilt since then [J].
+        account: Number of the account; sums begin anew with it.
+    """
+
+    t: Array
+    storage: Array
+    supplied: Array
+    dissipated: Array
+    demand: Array
+    tank: Array
+    reserve: Array
+    sigma: Array
+    grip: Array
+    residual: Array
+    received: Array
+    measured: Array
+    brought: Array
+    credit: Array
+    refilled: Array
+    lost: Array
+    account: Array
+
+
+def team_account(recorded: Recorded) -> TeamAccount:
+    """The account as it was told.
+
+    Raises:
+        RecordingError: The topic is missing, of another type, empty or without one of its labels.
+    """
+    series = recorded.run.labelled(recorded.team_topic(TOPIC))
+    missing = [label for label in LABELS if label not in series.labels]
+    if missing or not len(series.stamps):
+        raise RecordingError(f"{recorded.run.path}: {TOPIC} lacks {', '.join(missing) or 'data'}")
+    columns = {label: series[label] for label in LABELS}
+    return TeamAccount(recorded.since_start(series.stamps), **columns)
+
+
+def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
+    """Gates, levels and residual of the account."""
+    names = ("account.residual", "account.sigma", "account.grip")
+    try:
+        found = team_account(recorded)
+    except RecordingError as error:
+        reason = str(error)
+        return {"reason": reason}, [not_applicable(name, 0.0, "", reason) for name in names]
+    steps = np.diff(found.t, append=found.t[-1])
+    metrics = {
+        "sigma_min": float(found.sigma.min()),
+        "sigma_below_1_s": float(steps[found.sigma < 1.0].sum()),
+        "grip_min": float(found.grip.min()),
+        "grip_below_1_s": float(steps[found.grip < 1.0].sum()),
+        "residual_max_J": float(found.residual.max()),
+        "tank_min_J": float(found.tank.min()),
+        "tank_max_J": float(found.tank.max()),
+        "reserve_min_J": float(found.reserve.min()),
+        "storage_max_J": float(found.storage.max()),
+        "received_J": float(found.received[-1]),
+        "lost_J": float(found.lost[-1]),
+        "credit_J": float(found.credit[-1]),
+        "refilled_J": float(found.refilled[-1]),
+        "accounts": len(np.unique(found.account)),
+    }
+    checks = [at_most(names[0], metrics["residual_max_J"], _rounding(recorded, found), "J")]
+    reason = _may_close(recorded)
+    for name, lowest in zip(names[1:], ("sigma_min", "grip_min"), strict=True):
+        checks.append(
+            not_applicable(name, 1.0, "", reason)
+            if reason
+            else at_least(name, metrics[lowest], 1.0, "")
+        )
+    return metrics, checks
+
+
+def _rounding(recorded: Recorded, found: TeamAccount) -> float:
+    """Largest residual that rounding of all sums can make [J]."""
+    sums = (found.storage, found.tank, found.reserve, found.received, found.brought, found.lost)
+    scale = sum(float(np.abs(item).max()) for item in sums)
+    return ROUNDING * len(recorded.t) * scale
+
+
+def _may_close(recorded: Recorded) -> str:
+    """Why a gate may close in this run, or an empty text."""
+    scenario = recorded.scenario
+    if scenario.general.law != GATED:
+        return f"law {scenario.general.law} has no gates"
+    if scenario.surroundings or scenario.pushes:
+        return f"what the team touches may close a gate: {', '.join(_touched(recorded))}"
+    if any(recorded.has(f"{robot}/push") for robot in scenario.robots):
+        return "somebody pushed the team, which may close a gate"
+    return ""
+
+
+def _touched(recorded: Recorded) -> list[str]:
+    return [*recorded.scenario.surroundings, *recorded.scenario.pushes]
