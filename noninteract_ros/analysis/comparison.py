@@ -29,7 +29,8 @@ SAME = 1e-12  # [m, m/s] the same arithmetic on another processor may round diff
 # (29) keeps a subtask on its reference whatever others do; how it comes back is another thing.
 OFF = "a subtask is off its reference, and its inertia depends on where the others are"
 DECOUPLING_LAWS = ("energy_gated", "noninteracting", "paper")
-WINDOW = 2.0  # [s] that side runs go on after the last source has begun
+WINDOW = 2.0  # [s] that rehearsals without a source go on after it has begun
+SHORTEST = 2000  # ticks of a rehearsal for its own sake
 BUDGET = 400_000  # coordinates times ticks that one rehearsal may take
 
 
@@ -64,7 +65,13 @@ class Comparer:
         self._laws = [self._law, *(_others(recorded, self._law) if other_laws else ())]
         last = int(recorded.ticks[-1]) + 1 if recorded.lockstep else _planned_ticks(recorded)
         self._whole = min(last, BUDGET // recorded.team.n)
-        self._side = min(self._whole, self._side_ticks())
+        # What a source moves shows soon; rehearsals without it need not go on for longer.
+        self._sides = {
+            source: min(self._whole, round((start + WINDOW) * recorded.rate) + 1)
+            for source, start in _starts(recorded).items()
+            if source in self._owned
+        }
+        self._longest = max(self._sides.values(), default=min(self._whole, SHORTEST))
         self._results: dict[Variant, Joints] = {}
 
     def compare(self) -> Comparison:
@@ -79,25 +86,17 @@ class Comparer:
         }
         return Comparison(metrics, [check, *checks])
 
-    def _side_ticks(self) -> int:
-        scenario = self._recorded.scenario
-        starts = [0.0]
-        if scenario.haptic:
-            starts.append(scenario.haptic.start_time)
-        starts += [formation.time for formation in scenario.formations.values()][:1]
-        return round((max(starts) + WINDOW) * self._recorded.rate) + 1
-
     def _without(self, law: str, source: str) -> Variant:
         return Variant(law, human=source != "human", autonomy=source != "autonomy")
 
     def _rehearse(self) -> None:
         # The whole run serves the reproduction only.
-        ticks = self._side if self._incomparable("*") else self._whole
+        ticks = self._longest if self._incomparable("*") else self._whole
         jobs = [(Variant(self._law), ticks)]
         for law in self._laws:
-            jobs += [(self._without(law, source), self._side) for source in self._owned]
+            jobs += [(self._without(law, source), side) for source, side in self._sides.items()]
             if law != self._law and self._owned:
-                jobs.append((Variant(law), self._side))
+                jobs.append((Variant(law), self._longest))
         results = rehearse_all(self._recorded.scenario, jobs)
         self._results = {job[0]: result for job, result in zip(jobs, results, strict=True)}
 
@@ -128,12 +127,13 @@ class Comparer:
             without = self._results[self._without(self._law, source)]
             others = np.ones(self._recorded.team.n, dtype=bool)
             others[self._recorded.part(owned)] = False
+            seconds = self._seconds(len(without.q))
             reason, moved, limits = self._moved_against(without, owned, others)
             if not reason and not moved[~others].max() > 0.0:
-                reason = f"{source} did not move {owned} within {self._side_s:g} s"
+                reason = f"{source} did not move {owned} within {seconds:g} s"
             metrics[f"without_{source}"] = {
                 "reason": reason or None,
-                "compared_s": self._side_s,
+                "compared_s": seconds,
                 "moved_m": None if reason else self._by_subtask(moved),
                 "allowed_m": None if reason else self._by_subtask(limits),
             }
@@ -153,7 +153,7 @@ class Comparer:
         if self._law not in DECOUPLING_LAWS:
             return f"law {self._law} lets motions cross over", nothing, nothing
         alone_in_it = "" if others.any() else "there is no other subtask"
-        if reason := self._incomparable(owned) or self._carried_over() or alone_in_it:
+        if reason := self._incomparable(owned) or self._carried_over(without) or alone_in_it:
             return reason, nothing, nothing
         difference, alone = self._held_apart(without)
         off = np.abs(without.error).max(axis=0) > MOVED + alone
@@ -165,7 +165,7 @@ class Comparer:
     def _unit(self) -> str:
         return "m, rad" if self._recorded.stack.layout.rotates else "m"
 
-    def _carried_over(self) -> str:
+    def _carried_over(self, without: Joints) -> str:
         """Why subtasks move each other whatever the law does, or an empty text."""
         scenario = self._recorded.scenario
         if scenario.surroundings:
@@ -174,7 +174,7 @@ class Comparer:
             return "what a push does depends on where the team is"
         if self._recorded.team.friction.any():
             return FRICTION
-        if ticks := self._recorded.interventions(self._side_s):
+        if ticks := self._recorded.interventions(self._seconds(len(without.q))):
             return (
                 f"singularities, limits of joints or energy changed the torques of {ticks} ticks"
             )
@@ -189,17 +189,17 @@ class Comparer:
         recorded = self._recorded
         if recorded.constant:
             return np.zeros(recorded.team.n), np.zeros(recorded.team.n)
-        rows = told_rows(recorded, min(self._side, len(recorded.ticks)))
+        rows = told_rows(recorded, min(len(without.q), len(recorded.ticks)))
         rows = rows[recorded.ticks[rows] < len(without.q)]
         ticks = recorded.ticks[rows]
         force = self._holding.force[: len(rows)]
         changes = np.zeros_like(without.v)
         changes[1:-1] = np.diff(without.torque[1:], axis=0)
         alone = holding_force(recorded, without.q[ticks], without.v[ticks], changes[ticks])
-        impedance = impedance_of(recorded)
+        impedance, seconds = impedance_of(recorded), self._seconds(len(without.q))
         return (
-            deflection(impedance, force - alone, self._side_s),
-            deflection(impedance, alone, self._side_s),
+            deflection(impedance, force - alone, seconds),
+            deflection(impedance, alone, seconds),
         )
 
     @cached_property
@@ -217,7 +217,7 @@ class Comparer:
                 if full is not None
             }
         return {
-            "compared_s": self._side_s,
+            "compared_s": {source: self._seconds(ticks) for source, ticks in self._sides.items()},
             "led_by": dict(self._owned),
             "moved_m": laws,
             "note": "paper is the same law as noninteracting on constant inertias"
@@ -225,9 +225,8 @@ class Comparer:
             else None,
         }
 
-    @property
-    def _side_s(self) -> float:
-        return (self._side - 1) / self._recorded.rate
+    def _seconds(self, ticks: int) -> float:
+        return (ticks - 1) / self._recorded.rate
 
     def _moved_by(self, without: Joints) -> Array:
         """Largest distance of the recording from a rehearsal, shape (n,) [m; rad]."""
@@ -262,6 +261,16 @@ class Comparer:
             return "wall time: every run is another one"
         texts = [item.text for item in self._outside if item.subtask != ignored]
         return f"not in the scenario: {'; '.join(texts)}" if texts else ""
+
+
+def _starts(recorded: Recorded) -> dict[str, float]:
+    """When each source begins to move something, or when all have begun, if that is before [s]."""
+    scenario = recorded.scenario
+    formations = [formation.time for formation in scenario.formations.values()] or [0.0]
+    human = scenario.haptic.start_time if scenario.haptic else 0.0
+    # Where there are several formations the team mostly starts in the first.
+    changed = formations[:2][-1]
+    return {"human": human, "autonomy": min(changed, max(human, formations[0]))}
 
 
 def _owned_subtasks(recorded: Recorded) -> dict[str, str]:

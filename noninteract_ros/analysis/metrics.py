@@ -18,7 +18,9 @@ from noninteract_ros.analysis.energy_account import energy_metrics
 from noninteract_ros.analysis.holding import recorded_holding
 from noninteract_ros.analysis.influences import Influence, influences
 from noninteract_ros.analysis.link_metrics import link_metrics
+from noninteract_ros.analysis.passivity import passivity_metrics
 from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.team_account import account_metrics
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import RecordingError
 
@@ -71,11 +73,13 @@ def measure(recorded: Recorded, other_laws: bool = True) -> Findings:
             found = [not_applicable(f"storage_positive.{name}", 0.0, "J", str(error))]
         energy_checks += found
     metrics |= {"closed_form": closed, **comparison.metrics, "energy": energies}
+    metrics["account"], account_checks = account_metrics(recorded)
+    metrics["passivity"], passivity_checks = passivity_metrics(recorded)
     metrics["diagnostics"], diagnostic_checks = diagnostics_metrics(recorded)
     link, link_checks = link_metrics(recorded)
     metrics |= link
-    checks += [*closed_checks, *comparison.checks, *energy_checks, *diagnostic_checks]
-    checks += link_checks
+    checks += [*closed_checks, *comparison.checks, *energy_checks, *account_checks]
+    checks += [*passivity_checks, *diagnostic_checks, *link_checks]
     return Findings(metrics, checks)
 
 

@@ -12,7 +12,8 @@ its errors e. Forces from outside also work along the references, v_d = S dx_d/d
 
     received = received by the law + int v_d' tau_e dt,
 
-with tau_e from the recorded motion as well: M a + C v + g - tau_k in the middle of each tick.
+with tau_e from the recorded motion as well: M a + C v + g - tau_k in the middle of each tick. To
+the integral belongs what holding J and g over a tick does along references that move.
 """
 
 from dataclasses import dataclass
@@ -154,11 +155,18 @@ def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, moved
         v = 0.5 * (recorded.v[row] + recorded.v[row + 1])
         acceleration = (recorded.v[row + 1] - recorded.v[row]) * rate
         external = team.inverse_dynamics(q, v, acceleration) - torque[number]
-        J = recorded.stack.evaluate(team.state(q, v)).J
+        state = team.state(q, v)
+        task = recorded.stack.evaluate(state)
         try:
-            work[number] = np.linalg.solve(J, wanted[number]) @ external / rate
+            along = np.linalg.solve(task.J, wanted[number])
+            turned = np.linalg.solve(task.J, task.J_rate @ along)
         except np.linalg.LinAlgError:
             work[number] = np.nan
+            continue
+        # Over the tick the law counts with gravity and Jacobian as they were when it began.
+        drift = team.gravity(recorded.q[row]) - state.g
+        held = 0.5 / rate * (torque[number] - state.g) @ turned
+        work[number] = (along @ (external + drift) - held) / rate
     return work
 
 

@@ -3,11 +3,15 @@
 
 import multiprocessing
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 Result = TypeVar("Result")
+
+# A fresh interpreter each: a fork would inherit the threads of whoever asks.
+FRESH = multiprocessing.get_context("spawn")
 
 
 def in_processes(
@@ -23,8 +27,24 @@ def in_processes(
     workers = min(len(jobs), os.cpu_count() or 1)
     if workers < 2 or not worth_it:
         return [function(*job) for job in jobs]
-    # A fresh interpreter each: a fork would inherit the threads of whoever asks.
-    fresh = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=fresh) as pool:
+    with ProcessPoolExecutor(workers, mp_context=FRESH) as pool:
         running = [pool.submit(function, *job) for job in jobs]
         return [item.result() for item in running]
+
+
+@contextmanager
+def beside(
+    function: Callable[..., Result], job: tuple[Any, ...], worth_it: bool = True
+) -> Iterator[Callable[[], Result]]:
+    """Works on a job in another process meanwhile; gives a function that waits for the result.
+
+    Args:
+        function: What to call; it must be importable.
+        job: Its arguments.
+        worth_it: Whether the work is long enough; otherwise it is done when the result is asked.
+    """
+    if not worth_it or (os.cpu_count() or 1) < 2:
+        yield lambda: function(*job)
+        return
+    with ProcessPoolExecutor(1, mp_context=FRESH) as pool:
+        yield pool.submit(function, *job).result

@@ -3,7 +3,7 @@
 
 import json
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,9 @@ from noninteract_ros.analysis.checks import Check
 from noninteract_ros.analysis.compliance import compare_laws, laws_metrics
 from noninteract_ros.analysis.figures import draw
 from noninteract_ros.analysis.metrics import Findings, measure
+from noninteract_ros.analysis.processes import beside
 from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.rehearsals import SMALL
 from noninteract_ros.analysis.run import Run
 from noninteract_ros.analysis.storage_order import storage_orders
 from noninteract_ros.analysis.tables import tables
@@ -74,23 +76,31 @@ def write_report(
     run = Run.open(run_path)
     recorded = Recorded(run)
     folder = out or run.path.parent
-    findings = measure(recorded, other_laws)
-    if compare:
-        _compare(recorded, findings)
-    checks = tuple(findings.checks)
-    report = Report(findings.metrics, checks, ())
-    metrics = _finite(
-        findings.metrics
-        | {"checks": [check.as_dict() for check in checks], "passed": report.passed}
-    )
+    worth_it = len(recorded.t) >= SMALL
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        path = folder / METRICS_NAME
-        path.write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-        figures, missing = draw(recorded, folder)
+        with beside(_draw, (run.path, folder), worth_it) as drawing:
+            findings = measure(recorded, other_laws)
+            if compare:
+                _compare(recorded, findings)
+            report = Report(findings.metrics, tuple(findings.checks), ())
+            path = _write_metrics(report, folder / METRICS_NAME)
+            figures, missing = drawing()
     except OSError as error:
         raise RecordingError(f"{folder}: cannot be written: {error.strerror}") from error
-    return Report(metrics, checks, (path, *figures), tuple(missing))
+    return replace(report, files=(path, *figures), missing=tuple(missing))
+
+
+def _draw(path: Path, folder: Path) -> tuple[list[Path], list[str]]:
+    """Draws a recording, read anew: it need not be sent to another process."""
+    return draw(Recorded(Run.open(path)), folder)
+
+
+def _write_metrics(report: Report, path: Path) -> Path:
+    checks = [check.as_dict() for check in report.checks]
+    metrics = _finite(report.metrics | {"checks": checks, "passed": report.passed})
+    path.write_text(json.dumps(metrics, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return path
 
 
 def _compare(recorded: Recorded, findings: Findings) -> None:

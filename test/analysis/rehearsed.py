@@ -12,6 +12,7 @@ from rclpy.serialization import serialize_message
 
 from noninteract_ros.analysis.recording import RunWriter
 from noninteract_ros.analysis.run import Run
+from noninteract_ros.analysis.team_account import LABELS
 from noninteract_ros.clock import stamp, tick_stamp
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.messages import (
@@ -86,6 +87,7 @@ def record(
     extra: Callable[[RunWriter], None] | None = None,
 ) -> Run:
     """Rehearses a scenario for a time [s] and records all topics of the run."""
+    folder.mkdir(parents=True, exist_ok=True)
     text = yaml.safe_dump({"/**": {"ros__parameters": dict(values)}})
     with RunWriter(folder / "run.mcap", text, overwrite=True) as writer:
         _Recording(writer, Scenario.from_dict(values), tamper).run(duration)
@@ -106,6 +108,8 @@ class _Recording:
             SubtaskCodec(t.name, t.elements, t.axes, t.rotates) for t in stack.subtasks
         ]
         self._energy = EnergyCodec(ENERGY_LABELS)
+        self._account = EnergyCodec(("time", *LABELS))
+        self._measured = 0.0
         self._interventions = 0
         self._narrators = []
         if scenario.haptic:
@@ -184,8 +188,34 @@ class _Recording:
                  energy.dissipated[i], self._interventions]
             )  # fmt: skip
             self._add(f"{codec.name}/energy", LABELLED, now, self._energy.encode, account)
+        self._tell_account(now, tick, team.external_torque(tick.state, wrenches))
+
+    def _tell_account(self, now: int, tick: Any, external: np.ndarray) -> None:
+        """What the controller tells of the port where the team is touched."""
+        account, tank = tick.account, tick.account.tank
+        supplied = float(tick.error.e_rate @ tick.dynamics.force_of(external))
+        self._measured += supplied * self._period / self._rate
+        values = (
+            now / 1e9, account.storage, supplied, account.dissipated, account.demand, tank.level,
+            tank.reserve, tank.sigma, tank.grip, account.residual, account.received,
+            self._measured, tank.brought, tank.granted, tank.refilled, tank.lost, account.number,
+        )  # fmt: skip
+        self._add("energy", LABELLED, now, self._account.encode, np.array(values, dtype=float))
 
 
 def reference(codec: SubtaskCodec, time: float, position: np.ndarray) -> bytes:
     """A serialized reference at rest."""
     return codec.encode(stamp(time), position, 0 * position, 0 * position)
+
+
+def told(change: Callable[[dict[str, float]], None]) -> Tamper:
+    """Changes the account of the team that a run records, by label."""
+
+    def tamper(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+        if topic == "energy":
+            columns = dict(zip(("time", *LABELS), arrays[0], strict=True))
+            change(columns)
+            return [np.array(list(columns.values()))]
+        return arrays
+
+    return tamper

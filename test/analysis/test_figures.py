@@ -132,6 +132,7 @@ def test_files_are_written_and_what_is_missing_is_named(pair: Recorded, tmp_path
         "fig2_cooperative.png",
         "fig3_relative.png",
         "fig4_storage.png",
+        "fig5_energy.png",
         "paths.png",
         "motion.png",
         "motion.gif",
@@ -147,5 +148,5 @@ def test_files_are_written_and_what_is_missing_is_named(pair: Recorded, tmp_path
 
     files, missing = draw(Recorded(record(tmp_path, scenario_values(), 0.2, bare)), tmp_path)
     assert [file.name for file in files] == ["paths.png", "motion.png", "motion.gif"]
-    assert len(missing) == 3
+    assert len(missing) == 4
     assert "cooperative/state is not in the recording" in missing[0]
