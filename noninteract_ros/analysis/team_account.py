@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 
 from noninteract_ros.analysis.checks import Check, at_least, at_most, not_applicable
-from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.recorded import INTERVENTIONS, Recorded, common_instants
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import RecordingError
 
 TOPIC = "energy"
 GATED = "energy_gated"
+LIMITS = ("limit", "too fast", "singularity", "no finite torque")  # in what a controller says
 # Shares of the largest sum that rounding may add to the residual at a tick.
 ROUNDING = 64.0 * float(np.finfo(float).eps)
 LABELS = (
@@ -118,7 +119,7 @@ def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
         "accounts": len(np.unique(found.account)),
     }
     checks = [at_most(names[0], metrics["residual_max_J"], _rounding(recorded, found), "J")]
-    reason = _may_close(recorded)
+    reason = _may_close(recorded, found)
     for name, lowest in zip(names[1:], ("sigma_min", "grip_min"), strict=True):
         checks.append(
             not_applicable(name, 1.0, "", reason)
@@ -135,17 +136,36 @@ def _rounding(recorded: Recorded, found: TeamAccount) -> float:
     return ROUNDING * len(recorded.t) * scale
 
 
-def _may_close(recorded: Recorded) -> str:
+def _may_close(recorded: Recorded, found: TeamAccount) -> str:
     """Why a gate may close in this run, or an empty text."""
     scenario = recorded.scenario
     if scenario.general.law != GATED:
         return f"law {scenario.general.law} has no gates"
-    if scenario.surroundings or scenario.pushes:
-        return f"what the team touches may close a gate: {', '.join(_touched(recorded))}"
+    if not recorded.lockstep:
+        return "wall time: torques act late, which costs energy"
+    if touched := [*scenario.surroundings, *scenario.pushes]:
+        return f"what the team touches may close a gate: {', '.join(touched)}"
     if any(recorded.has(f"{robot}/push") for robot in scenario.robots):
         return "somebody pushed the team, which may close a gate"
+    if limits_acted(recorded, found):
+        return "singularities or limits of joints acted, which may close a gate"
     return ""
 
 
-def _touched(recorded: Recorded) -> list[str]:
-    return [*recorded.scenario.surroundings, *recorded.scenario.pushes]
+def limits_acted(recorded: Recorded, found: TeamAccount) -> bool:
+    """Whether anything but a gate changed the law's torque.
+
+    As far as the controller's diagnostics say so, and as open gates let one see it.
+    """
+    statuses = recorded.run.diagnostics() if recorded.has("diagnostics") else []
+    for status in statuses:
+        told = status["name"].endswith("controller") and status["message"]
+        if told and any(word in told for word in LIMITS):
+            return True
+    series = recorded.run.labelled(f"{recorded.stack.names[0]}/energy")
+    if INTERVENTIONS not in series.labels:
+        return False
+    rows, others = common_instants(recorded.since_start(series.stamps), found.t)
+    opened = (found.sigma[others] == 1.0) & (found.grip[others] == 1.0)
+    more = np.diff(series[INTERVENTIONS][rows]) > 0.0
+    return bool((more & opened[1:] & opened[:-1]).any())
