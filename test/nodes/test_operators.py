@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, TwistStamped
-from harness import Ros, merged, paper, until
+from harness import DEADLINE, Ros, merged, paper, until
 from rclpy.parameter import Parameter
 from repository import ROOT
 from sensor_msgs.msg import Joy
@@ -67,7 +67,7 @@ class Bench:
 
     def publish(self, publisher: Any, message: Any, rate: float, done: Callable[[], Any]) -> None:
         """Publishes at a rate until something is true."""
-        end = time.monotonic() + 20.0
+        end = time.monotonic() + DEADLINE
         while not done():
             assert time.monotonic() < end, "nothing came of it"
             publisher.publish(message)
@@ -245,7 +245,7 @@ def test_a_key_leads_while_it_repeats_and_space_stops(ros: Ros) -> None:
     bench = Bench(ros, keys.make)
     keys.strike("d")
     time.sleep(0.5)  # What the keyboard waits before it repeats.
-    end = time.monotonic() + 20.0
+    end = time.monotonic() + DEADLINE
     while bench.place()[1] > -0.05:
         assert time.monotonic() < end, "nothing came of it"
         keys.strike("d")
