@@ -20,6 +20,9 @@ class SafetySettings:
     singularity_end: float = key(
         "Relative regularity below which the team only recovers", 0.1, positive=True, maximum=1.0
     )
+    singularity_escape: bool = key(
+        "Whether a team that was put into a singularity moves out by itself; else it stands", True
+    )
     recovery_stiffness: float = key(
         "Pull back to the last regular configuration [1/s^2]", 100.0, minimum=0.0
     )

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Near singularities, where assumption 3 fails: the law fades out, and the team recovers."""
 
+from typing import Protocol
+
 import numpy as np
 
 from noninteract_ros.arrays import Array
@@ -43,27 +45,48 @@ def best_regularity(team: Team, stack: SubtaskStack) -> float:
     return best
 
 
+class Scout(Protocol):
+    """Looks for a way out of a singularity, see `way_out`."""
+
+    def forget(self) -> None:
+        """The next search starts where the team is then."""
+
+    def goal(self, q: Array) -> Array:
+        """Where to go from a configuration, shape (nq,)."""
+
+
 class SingularityGuard:
     """Blends the law with a recovery, by how regular the task Jacobian is.
 
     The law fades out continuously as the regularity falls. In its place the team is pulled back,
     damped, to the last configuration that was regular, and so leaves by itself. A team that was
-    never seen regular is only damped: nobody knows where it can safely go.
+    never seen regular is pulled where it is led out, or only damped, if there is nobody to lead.
 
     Args:
         team: The robots.
         settings: Thresholds and gains.
         best: Regularity that counts as 1.
+        scout: Knows ever better configurations on the way out, or None.
     """
 
-    def __init__(self, team: Team, settings: SafetySettings, best: float) -> None:
+    def __init__(
+        self, team: Team, settings: SafetySettings, best: float, scout: Scout | None = None
+    ) -> None:
         self._team, self._settings, self._best = team, settings, best
+        self._scout = scout if settings.singularity_escape else None
         self._regular: Array | None = None
         self._pull = 0.0
+
+    @property
+    def lost(self) -> bool:
+        """Whether a way out of a singularity is being looked for."""
+        return self._regular is None and self._scout is not None
 
     def reset(self) -> None:
         """Forgets the last regular configuration, as when the team is put elsewhere."""
         self._regular, self._pull = None, 0.0
+        if self._scout is not None:
+            self._scout.forget()
 
     def relative(self, S: Array) -> float:
         """Regularity relative to the team's best, of S or of anything with its Frobenius norm."""
@@ -91,9 +114,12 @@ class SingularityGuard:
             self._regular, self._pull = q, 1.0
             return np.zeros_like(v)
         damping = -self._settings.recovery_damping * v
-        if self._regular is None:
-            return damping
+        goal = self._regular
+        if goal is None:
+            if self._scout is None:
+                return damping
+            goal = self._scout.goal(q)
         change = step / RAMP
         self._pull = max(0.0, self._pull - change) if stopped else min(1.0, self._pull + change)
-        way = self._team.difference(q, self._regular)
+        way = self._team.difference(q, goal)
         return self._settings.recovery_stiffness * self._pull * way + damping

@@ -26,6 +26,7 @@ from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInp
 from noninteract_ros.control.team_view import DenseView, Seen, TeamView
 from noninteract_ros.control.tick import Mode, Tick
 from noninteract_ros.control.waiting_springs import WaitingSprings
+from noninteract_ros.control.way_out import WayOut
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
@@ -78,7 +79,9 @@ class TeamController:
         self._springs, self._goals = WaitingSprings(transition_time), ForceGoals(team.n)
         self._law = LawInForce(self.gate, self._goals, transition_time, stop_rate)
         self._view: TeamView = Structure.of(team, stack) or DenseView(team, stack)
-        self._guard = SingularityGuard(team, safety, best_regularity(team, stack))
+        best = best_regularity(team, stack)
+        scout = WayOut(team, stack, best, safety.singularity_begin)
+        self._guard = SingularityGuard(team, safety, best, scout)
         self._safety = JointSafety(team, safety)
 
     @property
@@ -172,7 +175,9 @@ class TeamController:
         # At the tick of a stop the inputs still count, so that the torque starts without a step.
         left = self._law.left
         stopped = self._mode.stopped and (left is None or left.stopped)
-        if restarted or stopped or (left and left.stopped):
+        # Who looks for a way out of a singularity must not hold what lies inside it.
+        lost = self._guard.lost
+        if restarted or stopped or lost or (left and left.stopped):
             self._rest_at(seen.task.x)
         if restarted:
             self._guard.reset()

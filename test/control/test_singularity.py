@@ -242,9 +242,71 @@ def test_changes_of_law_near_a_singularity_have_no_torque_step(law):
     assert np.isfinite(gone.tick().torque).all()
 
 
-def test_a_team_put_into_a_singularity_is_held_and_pulled_nowhere():
-    """A state that jumps: nobody knows the way out, so that the team stands where it is."""
-    loop = Loop(team())
+STRETCHED = np.array([0.4, 0.0, 2.5, 0.0])
+
+
+def jumped_into_a_singularity(**keys) -> Loop:
+    loop = Loop(team(), **keys)
+    for _ in range(50):
+        loop.tick()
+    loop.simulation.q = STRETCHED.copy()
+    assert "jumped" in loop.tick().restarted
+    return loop
+
+
+def test_a_team_put_into_a_singularity_moves_out_by_itself():
+    """Softly, to where the law is almost whole again; then it can be led as ever."""
+    loop = jumped_into_a_singularity()
+    ticks = [loop.tick() for _ in range(1500)]
+    assert ticks[0].law_share == 0.0
+    assert ticks[-1].law_share > 0.8
+    torques = np.array([tick.torque for tick in ticks])
+    speeds = np.array([tick.state.v for tick in ticks])
+    assert np.abs(np.diff(torques, axis=0)).max() < 0.05 * np.abs(torques).max()
+    assert np.abs(speeds).max() < 2.0
+    assert np.abs(ticks[-1].state.v).max() < 0.05
+    assert led(loop, 2500, (0.0, 0.2))[-1].law_share == 1.0
+    rest = [loop.tick(np.array([0.0, 0.2])) for _ in range(2500)]
+    np.testing.assert_allclose(rest[-1].task.x[:2], [0.0, 0.2], atol=1e-3)
+
+
+def test_a_team_that_starts_in_a_singularity_can_be_led():
+    """It need not have been regular before, and finds the same way in every run."""
+    runs = []
+    for _ in range(2):
+        loop = Loop(team(start=((0.4, 0.0), (2.5, 0.0))))
+        for _ in range(500):
+            loop.tick()
+        runs.append(led(loop, 2500, (0.0, 0.2)))
+        assert runs[-1][-1].law_share == 1.0
+    first, second = ([tick.torque for tick in run] for run in runs)
+    np.testing.assert_array_equal(first, second)
+
+
+def test_a_stop_ends_the_way_out():
+    """After a stop nothing leads out: the team comes to rest."""
+    loop = jumped_into_a_singularity()
+    for _ in range(100):
+        loop.tick()
+    loop.controller.stop()
+    for _ in range(1000):
+        last = loop.tick()
+    assert np.abs(last.state.v).max() < 1e-4
+
+
+def test_the_way_out_stays_within_joint_limits():
+    """A joint at its limit is not led beyond it, whatever would be more regular there."""
+    given = team(start=((0.4, 0.0), (2.5, 0.0)), lower_limit=(-3.0, -0.02), upper_limit=(3.0, 0.4))
+    loop = Loop(given)
+    q = np.array([loop.tick().state.q for _ in range(1000)])
+    assert q[:, [1, 3]].min() > -0.02
+    assert q[:, [1, 3]].max() <= 0.4
+    assert q[-1, [1, 3]].min() > 0.1
+
+
+def test_a_team_put_into_a_singularity_is_held_where_it_may_not_move_out():
+    """Without the escape the team stands where it was put."""
+    loop = Loop(team(), safety=SafetySettings(singularity_escape=False))
     for _ in range(50):
         loop.tick()
     loop.simulation.q = np.array([0.4, 0.0, 2.5, 0.0])
