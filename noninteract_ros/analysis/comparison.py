@@ -19,7 +19,13 @@ from noninteract_ros.analysis.holding import (
 )
 from noninteract_ros.analysis.influences import Influence
 from noninteract_ros.analysis.recorded import FRICTION, Recorded
-from noninteract_ros.analysis.rehearsals import Joints, Variant, rehearse_all
+from noninteract_ros.analysis.rehearsals import (
+    Joints,
+    Variant,
+    owned_subtasks,
+    rehearse_all,
+    starts,
+)
 from noninteract_ros.arrays import Array
 
 # [m; rad] How far a source may move a subtask that is not its own. On inertias that vary with
@@ -61,14 +67,14 @@ class Comparer:
     ) -> None:
         self._recorded, self._outside = recorded, outside
         self._law = recorded.scenario.general.law
-        self._owned = _owned_subtasks(recorded)
+        self._owned = owned_subtasks(recorded.scenario)
         self._laws = [self._law, *(_others(recorded, self._law) if other_laws else ())]
         last = int(recorded.ticks[-1]) + 1 if recorded.lockstep else _planned_ticks(recorded)
         self._whole = min(last, BUDGET // recorded.team.n)
         # What a source moves shows soon; rehearsals without it need not go on for longer.
         self._sides = {
             source: min(self._whole, round((start + WINDOW) * recorded.rate) + 1)
-            for source, start in _starts(recorded).items()
+            for source, start in starts(recorded.scenario).items()
             if source in self._owned
         }
         self._longest = max(self._sides.values(), default=min(self._whole, SHORTEST))
@@ -261,27 +267,6 @@ class Comparer:
             return "wall time: every run is another one"
         texts = [item.text for item in self._outside if item.subtask != ignored]
         return f"not in the scenario: {'; '.join(texts)}" if texts else ""
-
-
-def _starts(recorded: Recorded) -> dict[str, float]:
-    """When each source begins to move something, or when all have begun, if that is before [s]."""
-    scenario = recorded.scenario
-    formations = [formation.time for formation in scenario.formations.values()] or [0.0]
-    human = scenario.haptic.start_time if scenario.haptic else 0.0
-    # Where there are several formations the team mostly starts in the first.
-    changed = formations[:2][-1]
-    return {"human": human, "autonomy": min(changed, max(human, formations[0]))}
-
-
-def _owned_subtasks(recorded: Recorded) -> dict[str, str]:
-    """Subtask that each source of the scenario leads."""
-    scenario = recorded.scenario
-    owned = {}
-    if scenario.haptic:
-        owned["human"] = scenario.haptic.subtask
-    if scenario.planner:
-        owned["autonomy"] = scenario.planner.subtask
-    return owned
 
 
 def _others(recorded: Recorded, law: str) -> list[str]:

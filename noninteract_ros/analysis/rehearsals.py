@@ -62,3 +62,22 @@ def rehearse_all(scenario: Scenario, jobs: Sequence[tuple[Variant, int]]) -> lis
     """Rehearses variants for so many ticks each; long ones in processes of their own."""
     work = [(scenario, *job) for job in jobs]
     return in_processes(rehearse_variant, work, sum(ticks for _, ticks in jobs) >= SMALL)
+
+
+def starts(scenario: Scenario) -> dict[str, float]:
+    """When each source begins to move something, or when all have begun, if that is before [s]."""
+    formations = [formation.time for formation in scenario.formations.values()] or [0.0]
+    human = scenario.haptic.start_time if scenario.haptic else 0.0
+    # Where there are several formations the team mostly starts in the first.
+    changed = formations[:2][-1]
+    return {"human": human, "autonomy": min(changed, max(human, formations[0]))}
+
+
+def owned_subtasks(scenario: Scenario) -> dict[str, str]:
+    """Subtask that each source of the scenario leads."""
+    owned = {}
+    if scenario.haptic:
+        owned["human"] = scenario.haptic.subtask
+    if scenario.planner:
+        owned["autonomy"] = scenario.planner.subtask
+    return owned
