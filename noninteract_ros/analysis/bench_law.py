@@ -11,8 +11,7 @@ from noninteract_ros.control.compiled_layout import CompiledLayout
 from noninteract_ros.control.decoupling import TaskError, commanded_acceleration
 from noninteract_ros.control.inputs import SOURCES
 from noninteract_ros.control.reference import Reference
-from noninteract_ros.control.structure import Structure
-from noninteract_ros.control.team_view import DenseView, TeamView
+from noninteract_ros.control.team_view import view_of
 
 
 class LawAlone:
@@ -23,7 +22,7 @@ class LawAlone:
         team = scenario.build_team()
         stack = scenario.build_stack(team)
         self._mode = scenario.build_controller(team, stack).mode
-        self._view: TeamView = Structure.of(team, stack) or DenseView(team, stack)
+        self._view = view_of(team, stack)
         self._layout = CompiledLayout(stack.layout)
         history = material.history
         self._rows = cycle(list(zip(history.q, history.v, history.desired, strict=True)))

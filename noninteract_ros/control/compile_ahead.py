@@ -21,7 +21,7 @@ def compile_ahead() -> None:
     gap = RelativePosition("relative_position").build("gap", team)
     stack = SubtaskStack(team, [lead, gap])
     Structure.of(team, stack)
-    CompiledLayout(stack.layout)
+    CompiledLayout(stack.layout).prepare()
 
 
 if __name__ == "__main__":

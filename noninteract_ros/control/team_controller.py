@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,9 +22,8 @@ from noninteract_ros.control.law_in_force import LawInForce
 from noninteract_ros.control.outside import Outside
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.singularity import SingularityGuard, best_regularity
-from noninteract_ros.control.structure import Structure
 from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
-from noninteract_ros.control.team_view import DenseView, Seen, TeamView
+from noninteract_ros.control.team_view import Seen, TeamView, view_of
 from noninteract_ros.control.tick import Mode, Tick
 from noninteract_ros.control.waiting_springs import WaitingSprings
 from noninteract_ros.control.way_out import WayOut
@@ -78,11 +78,20 @@ class TeamController:
         self.outside = Outside(team, measured, tank.observer_gain)
         self._springs, self._goals = WaitingSprings(transition_time), ForceGoals(team.n)
         self._law = LawInForce(self.gate, self._goals, transition_time, stop_rate)
-        self._view: TeamView = Structure.of(team, stack) or DenseView(team, stack)
         best = best_regularity(team, stack)
         scout = WayOut(team, stack, best, safety.singularity_begin)
         self._guard = SingularityGuard(team, safety, best, scout)
         self._safety = JointSafety(team, safety)
+
+    @cached_property
+    def _view(self) -> TeamView:
+        """How states are evaluated."""
+        return view_of(self.team, self.stack)
+
+    def prepare(self) -> None:
+        """Has everything compiled that a step needs; otherwise the first step waits for that."""
+        self._layout.prepare()
+        _ = self._view
 
     @property
     def mode(self) -> Mode:

@@ -118,3 +118,10 @@ class DeferredTask(SubtaskState):
         if name not in ("J", "J_rate"):
             raise AttributeError(name)
         return getattr(self._dynamics, name)
+
+
+def view_of(team: Team, stack: SubtaskStack) -> TeamView:
+    """Robot by robot, where the subtasks allow it; this imports numba and what it has compiled."""
+    from noninteract_ros.control.structure import Structure
+
+    return Structure.of(team, stack) or DenseView(team, stack)

@@ -49,6 +49,7 @@ class Controller(ScenarioNode):
         team = self.scenario.build_team()
         stack = self.scenario.build_stack(team)
         self.core: TeamController = self.scenario.build_controller(team, stack)
+        self.core.prepare()
         self._queue: deque[Callable[[], None]] = deque()
         self._state: tuple[int, Array, Array, Array | None] | None = None
         self._state_at = self._waiting_since = -np.inf
