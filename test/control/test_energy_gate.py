@@ -155,9 +155,11 @@ def test_half_open_gates_are_the_same_robot_by_robot(name):
 
 
 def test_references_that_jump_leave_the_gates_open():
-    """Free motion of unlike arms after jumps of a reference is paid by its credit."""
+    """Free motion of unlike arms after jumps of a reference, with little more than a full gate."""
     loop = Loop(damping=0.2)
-    zero = np.zeros(2)
+    gate, zero = loop.core.gate, np.zeros(2)
+    gate.settings = replace(gate.settings, initial=0.3, refill_fraction=0.0)
+    gate.restart()
     loop.run(0.01, push=False)
     start = loop.tick.task.x[:2]
     ticks = []
@@ -170,7 +172,6 @@ def test_references_that_jump_leave_the_gates_open():
             ticks += loop.run(1e-3, push=False)
     assert max(np.abs(tick.error.e).max() for tick in ticks) > 0.1
     assert min(tick.account.tank.sigma for tick in ticks) == 1.0
-    assert min(tick.account.tank.level for tick in ticks) > 0.25
 
 
 def test_a_change_of_law_begins_a_fresh_account_without_a_bump():
