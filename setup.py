@@ -21,7 +21,6 @@ PROGRAMS = {node: f"{NAME}.nodes.{node}:main" for node in NODES}
 PROGRAMS["noninteract"] = f"{NAME}.cli:main"
 ROBOTS = ["example-robot-data>=6.0"]  # Models of arms: 130 MB to download, 440 MB on disk.
 PEER = ["mujoco>=4.0"]  # Another simulator's dynamics, to test against: 20 MB to download.
-GAUNTLET = ["numba>=0.63"]  # Compiles the loops of `noninteract check gauntlet`.
 
 setup(
     name=NAME,
@@ -63,11 +62,9 @@ setup(
     extras_require={
         "robots": ROBOTS,
         "peer": PEER,
-        "gauntlet": GAUNTLET,
         "dev": [
             *ROBOTS,
             *PEER,
-            *GAUNTLET,
             "ruff>=0.17,<0.18",  # Another minor release formats differently.
             "mypy>=2.4",
             "playwright>=1.60",  # Drives the console's page in Chromium, where that is installed.

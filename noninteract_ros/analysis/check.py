@@ -14,7 +14,7 @@ from noninteract_ros.analysis.identities import identities
 from noninteract_ros.analysis.identity_check import check_identities
 from noninteract_ros.analysis.law_probe import LawProbe
 from noninteract_ros.analysis.loops import Loop, closed_loops
-from noninteract_ros.errors import NoninteractError, ScenarioError
+from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario_file import find_scenario, load_scenario
 
@@ -24,13 +24,8 @@ MARGINAL = 1e-9  # growth beyond 1 that rounding may cause where a mode neither 
 
 
 def _gauntlet(settings: CheckSettings) -> CheckReport:
-    try:
-        from noninteract_ros.analysis.gauntlet.check import check_gauntlet
-    except ModuleNotFoundError as error:
-        if error.name != "numba":
-            raise
-        needed = "the gauntlet needs Numba: pip install 'noninteract_ros[gauntlet]'"
-        raise NoninteractError(needed) from error
+    from noninteract_ros.analysis.gauntlet.check import check_gauntlet  # Loads the compiler.
+
     return check_gauntlet(settings.gauntlet)
 
 
