@@ -219,7 +219,7 @@ def check(
     delay: Annotated[int, typer.Option(min=0, help="Gauntlet: age of commands [ticks].")] = 0,
     drop: Annotated[float, typer.Option(min=0.0, help="Gauntlet: share of states lost.")] = 0.0,
     rate: Annotated[float, typer.Option(help="Gauntlet: ticks per second.")] = 1000.0,
-    horizon: Annotated[float, typer.Option(help="Gauntlet: time to come to rest [s].")] = 600.0,
+    horizon: Annotated[float, typer.Option(help="Gauntlet: time to come to rest [s].")] = 8000.0,
 ) -> int:
     """Check a scenario, and the law on its team, without running it."""
     from noninteract_ros.analysis.check import run_check
@@ -313,7 +313,9 @@ def _measure(parts: Sequence[str], settings: "BenchSettings") -> list["Row"]:
                 continue
             if "law" in parts:
                 rows += law_rows(name, material, settings.ticks)
-            if "node" in parts and name not in teams:
+            # Robots with topics of their own have no single state to be answered.
+            own = "node" in parts and material.scenario.own_states
+            if "node" in parts and name not in teams and not own:
                 rows += nodes.node_rows(name, values, material, settings.ticks)
         if "lockstep" in parts:
             status.update("lockstep of the real programs")

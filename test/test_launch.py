@@ -69,12 +69,21 @@ def started_nodes(launch_file: dict[str, Any], **arguments: str) -> list[Action]
     return start.options["function"](context)
 
 
+OPERATED = {
+    "noninteract",
+    "operator_console",
+    "joy_operator",
+    "pose_operator",
+    "keyboard_operator",
+}
+
+
 def test_every_program_of_a_run_is_started(launch_file: dict[str, Any]) -> None:
-    """The nodes started are the entry points of setup.py apart from the command line."""
+    """Programs of setup.py, apart from the command line and those of a person's devices."""
     nodes = started_nodes(launch_file)
     assert {node.options["package"] for node in nodes} == {PACKAGE}
     started = [node.options["executable"] for node in nodes]
-    assert sorted(started) == sorted(set(programs()) - {"noninteract"})
+    assert sorted(started) == sorted(set(programs()) - OPERATED)
 
 
 def test_all_nodes_share_one_scenario_and_namespace(launch_file: dict[str, Any]) -> None:

@@ -103,6 +103,8 @@ class Controller(ScenarioNode):
         stamp, item = parsed
         heard = self.core.inputs[subtask].sources[source]
         when = seconds(stamp)
+        if self._watch.begins_ahead(f"{subtask}/{source}", when, self._now):
+            return
         if item is None:
             heard.silent_until(when)
             return

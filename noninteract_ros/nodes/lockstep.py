@@ -29,7 +29,22 @@ class SourceWatch:
         self, names: Sequence[str], inputs: Mapping[str, SubtaskInput], timeout: float
     ) -> None:
         self._names, self._inputs, self._timeout = tuple(names), inputs, timeout
+        self._passed_over: set[str] = set()
         self.absent: set[str] = set()
+
+    def begins_ahead(self, name: str, when: float, now: float) -> bool:
+        """Whether the first word of a source, for `when` [s], is for a later tick than `now` [s].
+
+        What it said for this tick was lost then, as messages are before both ends know of each
+        other. It says everything again when the team sends its state again; then it is believed.
+        """
+        subtask, source = name.split("/")
+        heard = self._inputs[subtask].sources[source].heard_until > -float("inf")
+        if heard or when <= now + 1e-9 or name not in self._names or name in self._passed_over:
+            self._passed_over.discard(name)
+            return False
+        self._passed_over.add(name)
+        return True
 
     def missing(self, now: float, waiting_since: float) -> list[str]:
         """Sources that have not spoken for the tick at `now` [s] and are still waited for.

@@ -54,7 +54,7 @@ def test_torques_are_drawn_as_shares_of_their_limits(arms: Recorded) -> None:
     np.testing.assert_allclose(np.sort(drawn, axis=0), np.sort(expected.T, axis=0), rtol=1e-12)
     assert shares.get_ylabel() == "torque\n[share of its limit]"
     assert shares.get_ylim() == (0.0, 1.05)  # The limit itself is in the picture.
-    assert shares.get_legend() is not None
+    assert shares.figure.legends
 
 
 def test_torques_without_limits_are_drawn_as_they_are(tmp_path: Path) -> None:

@@ -100,7 +100,7 @@ def test_all_laws_stand_in_one_table(tmp_path):
     text = console.export_text()
     for row in rows:
         assert f"{row.position['relative']:.3g}" in text
-    assert text.count("noninteracting") == 3
+    assert text.count("energy_gated") == 3
     assert metrics["rows"][1]["max_error_m"]["relative"] == rows[1].position["relative"]
 
 

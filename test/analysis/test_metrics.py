@@ -133,9 +133,9 @@ def test_the_natural_law_lets_errors_cross_over(tmp_path: Path) -> None:
     assert limits[0] == limits[1] == pytest.approx(0.04 * max(peaks))
     moved = found.metrics["comparison"]["moved_m"]
     assert moved["natural"]["autonomy"]["cooperative"] > 1e-2
-    assert moved["energy_gated"]["autonomy"]["cooperative"] < 1e-12
+    assert moved["noninteracting"]["autonomy"]["cooperative"] < 1e-12
     assert moved["natural"]["human"]["relative"] > 1e-3
-    assert moved["energy_gated"]["human"]["relative"] < 1e-12
+    assert moved["noninteracting"]["human"]["relative"] < 1e-12
 
 
 def test_what_came_from_outside_is_named(tmp_path: Path) -> None:

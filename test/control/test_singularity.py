@@ -380,7 +380,7 @@ def test_a_law_that_fails_brakes_and_is_reported(monkeypatch):
         loop.tick()
     core = loop.controller
     with monkeypatch.context() as patch:
-        patch.setattr(core, "_wanted", lambda *_: np.full(4, np.nan))
+        patch.setattr(core._law, "_wanted", lambda *_: np.full(4, np.nan))
         for _ in range(200):
             tick = loop.tick()
             assert not tick.safety.finite
