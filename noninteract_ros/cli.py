@@ -219,7 +219,7 @@ def check(
     delay: Annotated[int, typer.Option(min=0, help="Gauntlet: age of commands [ticks].")] = 0,
     drop: Annotated[float, typer.Option(min=0.0, help="Gauntlet: share of states lost.")] = 0.0,
     rate: Annotated[float, typer.Option(help="Gauntlet: ticks per second.")] = 1000.0,
-    horizon: Annotated[float, typer.Option(help="Gauntlet: time to come to rest [s].")] = 8000.0,
+    horizon: Annotated[float, typer.Option(help="Gauntlet: time to come to rest [s].")] = 4000.0,
 ) -> int:
     """Check a scenario, and the law on its team, without running it."""
     from noninteract_ros.analysis.check import run_check

@@ -35,7 +35,7 @@ class GauntletSettings:
     delay: int = 0
     drop: float = 0.0
     rate: float = 1000.0
-    horizon: float = 8000.0
+    horizon: float = 4000.0
     jobs: int = 0
     only: int | None = None
     tank: TankSettings = field(default_factory=TankSettings)
