@@ -183,7 +183,7 @@ def inverse(J: Array) -> Array:
 
 
 def commanded_acceleration(
-    law: str, dynamics: TaskDynamics, error: TaskError, impedance: Impedance, grip: float = 1.0
+    law: str, dynamics: TaskDynamics, error: TaskError, impedance: Impedance
 ) -> Array:
     """Task acceleration that a law asks for, shape (n,): the fast form.
 
@@ -194,9 +194,15 @@ def commanded_acceleration(
         dynamics: Task dynamics at the state.
         error: Tracking state of the subtasks.
         impedance: Gains.
-        grip: Share nu of the impedance that is in force.
     """
-    pull = grip * (impedance.damping * error.e_rate + impedance.force(error.e)) - error.force
+    return acceleration_against(law, dynamics, error, impedance.feedback(error.e, error.e_rate))
+
+
+def acceleration_against(
+    law: str, dynamics: TaskDynamics, error: TaskError, feedback: Array
+) -> Array:
+    """The same where D e_rate + h(e), or the share of it in force, is known, shape (n,)."""
+    pull = feedback - error.force
     if error.goal is not None:
         pull = pull - error.goal
     if law == "natural":
@@ -207,11 +213,6 @@ def commanded_acceleration(
     else:
         drift = dynamics.coriolis_force(error.e_rate)
     return error.reference_acceleration - dynamics.divide_by_inertias(drift + pull)
-
-
-def torque_of(dynamics: TaskDynamics, v: Array, joint_acceleration: Array) -> Array:
-    """M a + C v + g, shape (n,) [N or N m]."""
-    return dynamics.M @ joint_acceleration + dynamics.C @ v + dynamics.g
 
 
 def paper_coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.decoupling import TaskDynamics, TaskError, commanded_acceleration
+from noninteract_ros.control.decoupling import TaskDynamics, TaskError, acceleration_against
 from noninteract_ros.control.energy_tank import EnergyTank
 from noninteract_ros.control.impedance import Impedance
 
@@ -38,9 +38,9 @@ class Decoupling:
 
 def decoupling(dynamics: TaskDynamics, error: TaskError, impedance: Impedance) -> Decoupling:
     """The decoupling at a state; no solution with Lambda is needed for it."""
-    acceleration = commanded_acceleration("noninteracting", dynamics, error, impedance)
+    feedback = impedance.feedback(error.e, error.e_rate)
+    acceleration = acceleration_against("noninteracting", dynamics, error, feedback)
     drift = dynamics.natural_coriolis_force(error.e_rate)
-    feedback = impedance.damping * error.e_rate + impedance.force(error.e)
     force = beyond_natural(dynamics, error, acceleration, drift + feedback)
     return Decoupling(acceleration, drift, feedback, force, float(error.e_rate @ force))
 
@@ -48,8 +48,7 @@ def decoupling(dynamics: TaskDynamics, error: TaskError, impedance: Impedance) -
 def without_law(dynamics: TaskDynamics, error: TaskError, impedance: Impedance) -> Decoupling:
     """What is left of it where the law is not defined: the feedback, for who feels it."""
     none = np.zeros_like(error.e)
-    feedback = impedance.damping * error.e_rate + impedance.force(error.e)
-    return Decoupling(none, none, feedback, none, 0.0)
+    return Decoupling(none, none, impedance.feedback(error.e, error.e_rate), none, 0.0)
 
 
 def beyond_natural(
@@ -61,18 +60,14 @@ def beyond_natural(
 
 
 def gated_acceleration(
-    dynamics: TaskDynamics,
-    error: TaskError,
-    impedance: Impedance,
-    added: Decoupling,
-    tank: EnergyTank[float],
+    dynamics: TaskDynamics, error: TaskError, added: Decoupling, tank: EnergyTank[float]
 ) -> Array:
     """Task acceleration of the gated law, shape (n,); that of complete decoupling, if open."""
     complete, sigma, grip = added.acceleration, tank.sigma, tank.grip
     if sigma == 1.0 and grip == 1.0:
         return complete
     if grip != 1.0:
-        complete = commanded_acceleration("noninteracting", dynamics, error, impedance, grip)
+        complete = acceleration_against("noninteracting", dynamics, error, grip * added.feedback)
     natural = error.reference_acceleration - dynamics.divide_by_inertia(
         added.drift + grip * added.feedback - error.force
     )

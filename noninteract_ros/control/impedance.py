@@ -93,6 +93,10 @@ class Impedance:
         linear = self.stiffness * e
         return linear if self.linear else linear / np.sqrt(1.0 + self._overload(linear))
 
+    def feedback(self, e: Array, e_rate: Array) -> Array:
+        """D e_rate + h(e), shape (n,) [N; N m]."""
+        return self.damping * e_rate + self.force(e)
+
     def potential(self, e: Array) -> Array:
         """V(e) by coordinate, shape (n,) [J]: K e^2 / 2 where linear.
 

@@ -4,11 +4,12 @@
 from dataclasses import replace
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.decoupling import commanded_acceleration
+from noninteract_ros.control.decoupling import acceleration_against
 from noninteract_ros.control.energy_gate import EnergyGate, Moment
 from noninteract_ros.control.fade import Fade
 from noninteract_ros.control.force_goal import ForceGoals
 from noninteract_ros.control.gated_law import decoupling, gated_acceleration
+from noninteract_ros.control.joint_safety import SafetyReport
 from noninteract_ros.control.team_view import Seen, TeamView
 from noninteract_ros.control.tick import Mode
 
@@ -86,7 +87,33 @@ class LawInForce:
         if mode.stopped:
             return dynamics.acceleration_of(v, -self._stop_rate * v)
         if mode.law == "energy_gated":
-            return gated_acceleration(dynamics, error, mode.impedance, added, self._gate.tank)
+            return gated_acceleration(dynamics, error, added, self._gate.tank)
         if mode.law == "noninteracting":
             return added.acceleration
-        return commanded_acceleration(mode.law, dynamics, error, mode.impedance)
+        return acceleration_against(mode.law, dynamics, error, added.feedback)
+
+    def remember(
+        self,
+        mode: Mode,
+        moment: Moment,
+        torque: Array,
+        acceleration: Array,
+        share: float,
+        safety: SafetyReport,
+    ) -> None:
+        """Tells the account what the torque of a tick is made of.
+
+        Args:
+            mode: Mode in force.
+            moment: The tick.
+            torque: Torque as sent, shape (n,) [N or N m].
+            acceleration: Task acceleration that was asked for, shape (n,).
+            share: Share of the law in it.
+            safety: What the limits of the joints made of it.
+        """
+        if share < 1.0 or not safety.finite:
+            self._gate.pause()  # It is another law's, which has no such account.
+        elif mode.stopped:
+            self._gate.remember_damping(moment, torque)
+        else:
+            self._gate.remember(moment, torque, acceleration, not safety.cut)

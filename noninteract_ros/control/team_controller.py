@@ -17,7 +17,7 @@ from noninteract_ros.control.energy_tank import TankSettings
 from noninteract_ros.control.force_goal import ForceGoals
 from noninteract_ros.control.gated_law import decoupling, without_law
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
-from noninteract_ros.control.joint_safety import JointSafety, SafetyReport
+from noninteract_ros.control.joint_safety import JointSafety
 from noninteract_ros.control.law_in_force import LawInForce
 from noninteract_ros.control.outside import Outside
 from noninteract_ros.control.safety_settings import SafetySettings
@@ -147,13 +147,16 @@ class TeamController:
         """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
         self._continuity.forget()
         self._law.fade.forget()
+        self._forget_motion()
         self.gate.restart()
-        self.outside.reset()
-        self._goals.forget()
-        self._guard.reset()
         self._safety.reset()
         for item in self.inputs.values():
             item.reset()
+
+    def _forget_motion(self) -> None:
+        self._guard.reset()
+        self._goals.forget()
+        self.outside.reset()
 
     def _change(self, mode: Mode) -> None:
         self._law.left = self._law.left or self._mode
@@ -189,9 +192,7 @@ class TeamController:
         if restarted or stopped or lost or (left and left.stopped):
             self._rest_at(seen.task.x)
         if restarted:
-            self._guard.reset()
-            self._goals.forget()
-            self.outside.reset()
+            self._forget_motion()
             self.gate.pause()
         led = tuple(
             item.resting(now) if stopped else item.advance(now, step)
@@ -210,7 +211,7 @@ class TeamController:
         )
         asked = seen.dynamics.torque(seen.state.v, wanted)
         torque, safety = self._safety.protect(q, v, asked, seen.state.g, elapsed)
-        self._remember(moment, torque, acceleration, share, safety)
+        self._law.remember(self._mode, moment, torque, acceleration, share, safety)
         self._regulate(seen, wrenches, step, held=share < 1.0 or safety.acted)
         self._continuity.note(now, q)
         self.outside.note(torque)
@@ -255,22 +256,6 @@ class TeamController:
         added = (decoupling if share > 0.0 else without_law)(seen.dynamics, error, impedance)
         q, x = seen.state.q, seen.task.x
         return Moment(now, q, x, references, error, seen.dynamics, impedance, added)
-
-    def _remember(
-        self,
-        moment: Moment,
-        torque: Array,
-        acceleration: Array,
-        share: float,
-        safety: SafetyReport,
-    ) -> None:
-        """Tells the account what this torque is made of."""
-        if share < 1.0 or not safety.finite:
-            self.gate.pause()  # It is another law's, which has no such account.
-        elif self._mode.stopped:
-            self.gate.remember_damping(moment, torque)
-        else:
-            self.gate.remember(moment, torque, acceleration, not safety.cut)
 
     def energy(self, tick: Tick, external_torque: Array) -> Energy:
         """Storage functions (32) and their rates (33) of a tick.

@@ -13,7 +13,6 @@ from noninteract_ros.control.decoupling import (
     commanded_acceleration,
     paper_coriolis_force,
     task_dynamics,
-    torque_of,
 )
 from noninteract_ros.control.impedance import Impedance
 from noninteract_ros.control.plain_form import (
@@ -71,7 +70,7 @@ class Case:
         dynamics = self.dynamics(state)
         acceleration = commanded_acceleration(law, dynamics, error, self.impedance)
         wanted = dynamics.joint_acceleration(state.v, acceleration)
-        return torque_of(dynamics, state.v, wanted)
+        return dynamics.torque(state.v, wanted)
 
     def task_acceleration(self, state: TeamState, torque) -> np.ndarray:
         """d2x/dt2 of the stacked subtasks under a joint torque, from (3) and (6)."""

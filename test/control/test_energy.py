@@ -11,7 +11,6 @@ from noninteract_ros.control.decoupling import (
     TaskError,
     commanded_acceleration,
     task_dynamics,
-    torque_of,
 )
 from noninteract_ros.control.energy import Energy, energy
 from noninteract_ros.control.impedance import Impedance
@@ -72,7 +71,7 @@ class Motion:
         x, x_rate, x_rate_rate = self.reference(t)
         error = TaskError(task.x - x, task.J @ state.v - x_rate, x_rate, x_rate_rate, self.force)
         wanted = commanded_acceleration(self.law, dynamics, error, self.impedance)
-        torque = torque_of(dynamics, state.v, dynamics.joint_acceleration(state.v, wanted))
+        torque = dynamics.torque(state.v, dynamics.joint_acceleration(state.v, wanted))
         acceleration = ARMS.acceleration(state, torque + self.push)
         found = energy(dynamics, error, self.impedance, wanted, self.push)
         return np.concatenate([state.v, acceleration]), found

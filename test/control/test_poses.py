@@ -10,7 +10,6 @@ from noninteract_ros.control.decoupling import (
     TaskError,
     commanded_acceleration,
     task_dynamics,
-    torque_of,
 )
 from noninteract_ros.control.energy import Energy, energy
 from noninteract_ros.control.impedance import (
@@ -81,7 +80,7 @@ class Case:
     def torque(self, law: str, state: TeamState, error: TaskError) -> np.ndarray:
         dynamics = self.dynamics(state)
         wanted = commanded_acceleration(law, dynamics, error, self.impedance)
-        return torque_of(dynamics, state.v, dynamics.joint_acceleration(state.v, wanted))
+        return dynamics.torque(state.v, dynamics.joint_acceleration(state.v, wanted))
 
 
 CASES = [
@@ -235,7 +234,7 @@ class Motion:
         rates = wanted.velocity, wanted.acceleration
         error = TaskError(e, task.J @ v - wanted.velocity, *rates, self.force)
         asked = commanded_acceleration("noninteracting", dynamics, error, case.impedance)
-        torque = torque_of(dynamics, v, dynamics.joint_acceleration(v, asked))
+        torque = dynamics.torque(v, dynamics.joint_acceleration(v, asked))
         found = energy(dynamics, error, case.impedance, asked, self.push)
         return case.team.forward_dynamics(q, v, torque + self.push), found, error
 
