@@ -5,11 +5,10 @@ import json
 import os
 import sys
 import time
-from collections.abc import Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 # Matrices of a team are small; BLAS threads would only fight over the cores. Set before numpy.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -20,9 +19,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from noninteract_ros import __version__
 from noninteract_ros.errors import NoninteractError, ScenarioError, one_of
-
-if TYPE_CHECKING:
-    from noninteract_ros.analysis.bench import BenchSettings, Row
 
 app = typer.Typer(
     help="Robot teams led by a human: demos, reports, checks and measurements.",
@@ -74,6 +70,7 @@ def demo(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the console.")] = 8090,
 ) -> int:
     """Run a scenario on the full stack, record it, check it and draw it."""
+    from noninteract_ros.nodes.run_file import prepare
     from noninteract_ros.scenario_file import find_scenario
 
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
@@ -83,7 +80,7 @@ def demo(
         if in_process:
             raise ScenarioError("--in-process", "given", "nothing, with --console")
         return _lead(source, folder, duration, rate_factor, port)
-    file = _prepare(source, folder.resolve(), duration, rate_factor)
+    file = prepare(source, folder.resolve(), duration, rate_factor)
     interrupted = _run(file, folder.resolve(), in_process)
     if interrupted:
         console.print(f"Interrupted; what was recorded lies in {folder}")
@@ -96,44 +93,15 @@ def _lead(
 ) -> int:
     """Runs a scenario in real time with the console, which speaks for the human."""
     from noninteract_ros.nodes.demo import run_with_console
+    from noninteract_ros.nodes.run_file import prepare
     from noninteract_ros.scenario_file import for_console, read_parameters
 
     values = for_console(read_parameters(source), port)
-    file = _prepare(source, folder.resolve(), duration, rate_factor, values)
+    file = prepare(source, folder.resolve(), duration, rate_factor, values)
     with suppress(KeyboardInterrupt):
         run_with_console(file, folder.resolve(), partial(console.print, soft_wrap=True))
     console.print(f"Recorded in {folder}; draw it with: noninteract report {folder}")
     return 0
-
-
-def _prepare(
-    source: Path, folder: Path, duration: float | None, rate_factor: float, values: Any = None
-) -> Path:
-    """Writes the scenario as it is run: paused at the start, with an end, at its own rate.
-
-    Values of its own, as with a console, have no end but the one that is asked for.
-    """
-    from noninteract_ros.nodes.parameter_files import dump
-    from noninteract_ros.scenario_file import load_scenario, read_parameters
-
-    scenario = load_scenario(source)
-    if duration is not None and not duration > 0.0:
-        raise ScenarioError("--duration", duration, "> 0")
-    if not rate_factor > 0.0:
-        raise ScenarioError("--rate-factor", rate_factor, "> 0")
-    general = scenario.general
-    changes: dict[str, Any] = {
-        "rate": general.rate * rate_factor,
-        "duration": duration or general.duration,
-        "end_time": duration or (0.0 if values else general.duration),
-        "start_paused": True,
-    }
-    folder.mkdir(parents=True, exist_ok=True)
-    file = folder / "scenario.yaml"
-    values = values or read_parameters(source)
-    file.write_text(dump({"/**": {"ros__parameters": values | changes}}))
-    load_scenario(file)
-    return file
 
 
 def _run(file: Path, folder: Path, in_process: bool) -> bool:
@@ -213,22 +181,30 @@ def check(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="JSON instead of tables.")] = False,
-    cases: Annotated[int, typer.Option(min=1, help="Gauntlet: number of cases.")] = 1000,
+    cases: Annotated[int | None, typer.Option(min=1, help="Gauntlet: number of cases.")] = None,
     case: Annotated[int | None, typer.Option(min=0, help="Gauntlet: one case in full.")] = None,
     law: Annotated[list[str] | None, typer.Option(help="Gauntlet: this law only.")] = None,
-    delay: Annotated[int, typer.Option(min=0, help="Gauntlet: age of commands [ticks].")] = 0,
-    drop: Annotated[float, typer.Option(min=0.0, help="Gauntlet: share of states lost.")] = 0.0,
-    rate: Annotated[float, typer.Option(help="Gauntlet: ticks per second.")] = 1000.0,
-    horizon: Annotated[float, typer.Option(help="Gauntlet: time to come to rest [s].")] = 4000.0,
+    delay: Annotated[
+        int | None, typer.Option(min=0, help="Gauntlet: age of commands [ticks].")
+    ] = None,
+    drop: Annotated[
+        float | None, typer.Option(min=0.0, help="Gauntlet: share of states lost.")
+    ] = None,
+    rate: Annotated[float | None, typer.Option(help="Gauntlet: ticks per second.")] = None,
+    horizon: Annotated[
+        float | None, typer.Option(help="Gauntlet: time to come to rest [s].")
+    ] = None,
 ) -> int:
     """Check a scenario, and the law on its team, without running it."""
     from noninteract_ros.analysis.check import run_check
     from noninteract_ros.analysis.check_report import CheckSettings
-    from noninteract_ros.analysis.gauntlet.settings import LAWS, GauntletSettings
+    from noninteract_ros.analysis.gauntlet.settings import GauntletSettings
 
-    chosen = GauntletSettings(
-        cases, seed, tuple(law or LAWS), delay, drop, rate, horizon, only=case
-    )
+    options = {"cases": cases, "delay": delay, "drop": drop, "rate": rate, "horizon": horizon}
+    given: dict[str, Any] = {name: item for name, item in options.items() if item is not None}
+    if law:
+        given["laws"] = tuple(law)
+    chosen = GauntletSettings(seed=seed, only=case, **given)
     others = others or []
     file = Path(others.pop()) if target == "gauntlet" and as_json and others else None
     found = run_check(target, CheckSettings(samples, seed, gauntlet=chosen), others)
@@ -263,9 +239,12 @@ def bench(
     for name in part or ():
         if name not in measures.PARTS:
             raise ScenarioError("--part", name, one_of(measures.PARTS, name))
+    from noninteract_ros.nodes.bench import measure
+
     settings = measures.BenchSettings(ticks, rounds, seconds)
     machine = measures.machine()
-    rows = _measure(part or measures.PARTS, settings)
+    with console.status("starting") as status:
+        rows = measure(part or measures.PARTS, settings, status.update, console.print)
     machine["load average after"] = measures.load_average()
     figures = measures.as_dict(rows, machine)
     console.print(measures.table(figures))
@@ -282,48 +261,14 @@ def describe(
 ) -> int:
     """Write a scenario with the robots' descriptions in place of the topics they come on."""
     from noninteract_ros.nodes.describe import described
-    from noninteract_ros.nodes.parameter_files import dump
+    from noninteract_ros.nodes.parameter_files import write
     from noninteract_ros.scenario_file import find_scenario, load_scenario, read_parameters
 
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     values = described(read_parameters(find_scenario(scenario)), timeout)
-    out.write_text(dump({"/**": {"ros__parameters": values}}))
-    load_scenario(out)
+    write(out, values)
     console.print(f"{out}: {', '.join(load_scenario(out).robots)}")
     return 0
-
-
-def _measure(parts: Sequence[str], settings: "BenchSettings") -> list["Row"]:
-    from noninteract_ros.analysis import bench as measures
-    from noninteract_ros.analysis.bench_law import law_rows
-    from noninteract_ros.analysis.bench_teams import bench_teams
-    from noninteract_ros.nodes import bench as nodes
-
-    scenarios = measures.bench_scenarios()
-    paper, teams = scenarios["paper"], bench_teams() if "law" in parts else {}
-    rows = []
-    with console.status("starting") as status:
-        chosen = scenarios if {"law", "node"} & set(parts) else {}
-        for name, values in (chosen | teams).items():
-            status.update(f"law and controller node, {name}")
-            try:
-                material = measures.Material.of(values, settings.ticks + measures.WARM_UP)
-            except ScenarioError as error:  # Models of robots are an extra.
-                console.print(f"{name} is left out: {error}")
-                continue
-            if "law" in parts:
-                rows += law_rows(name, material, settings.ticks)
-            # Robots with topics of their own have no single state to be answered.
-            own = "node" in parts and material.scenario.own_states
-            if "node" in parts and name not in teams and not own:
-                rows += nodes.node_rows(name, values, material, settings.ticks)
-        if "lockstep" in parts:
-            status.update("lockstep of the real programs")
-            rows += nodes.lockstep_rows("paper", paper, settings)
-        if "wall" in parts:
-            status.update("wall time")
-            rows += nodes.wall_rows("paper", paper, settings)
-    return sorted(rows, key=lambda row: measures.PARTS.index(row.part))
 
 
 @app.command()

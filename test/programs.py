@@ -12,7 +12,7 @@ from typing import Any
 from harness import DEADLINE, Ear, until
 from repository import ROOT
 
-from noninteract_ros.nodes.parameter_files import dump
+from noninteract_ros.nodes.parameter_files import write
 
 
 class Programs:
@@ -41,7 +41,7 @@ class Programs:
     def write(self, values: Mapping[str, Any]) -> Path:
         """A scenario's file."""
         file = self._folder / "scenario.yaml"
-        file.write_text(dump({"/**": {"ros__parameters": dict(values)}}))
+        write(file, values)
         return file
 
     def python(self, name: str, *arguments: str) -> subprocess.Popen[str]:

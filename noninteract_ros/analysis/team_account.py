@@ -9,6 +9,7 @@ import numpy as np
 from noninteract_ros.analysis.checks import Check, at_least, at_most, not_applicable
 from noninteract_ros.analysis.recorded import INTERVENTIONS, Recorded, common_instants
 from noninteract_ros.arrays import Array
+from noninteract_ros.control.energy_account import QUANTITIES
 from noninteract_ros.errors import RecordingError
 
 TOPIC = "energy"
@@ -16,24 +17,6 @@ GATED = "energy_gated"
 LIMITS = ("limit", "too fast", "singularity", "no finite torque")  # in what a controller says
 # Shares of the largest sum that rounding may add to the residual at a tick.
 ROUNDING = 64.0 * float(np.finfo(float).eps)
-LABELS = (
-    "storage",
-    "supplied",
-    "dissipated",
-    "demand",
-    "tank",
-    "reserve",
-    "sigma",
-    "grip",
-    "residual",
-    "received",
-    "measured",
-    "brought",
-    "credit",
-    "refilled",
-    "lost",
-    "account",
-)
 
 
 @dataclass(frozen=True)
@@ -86,10 +69,10 @@ def team_account(recorded: Recorded) -> TeamAccount:
         RecordingError: The topic is missing, of another type, empty or without one of its labels.
     """
     series = recorded.run.labelled(recorded.team_topic(TOPIC))
-    missing = [label for label in LABELS if label not in series.labels]
+    missing = [label for label in QUANTITIES if label not in series.labels]
     if missing or not len(series.stamps):
         raise RecordingError(f"{recorded.run.path}: {TOPIC} lacks {', '.join(missing) or 'data'}")
-    columns = {label: series[label] for label in LABELS}
+    columns = {label: series[label] for label in QUANTITIES}
     return TeamAccount(recorded.since_start(series.stamps), **columns)
 
 

@@ -3,6 +3,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class Drivable:
     turn_rate: float
     workspace: Workspace | None = None
 
-    @property
+    @cached_property
     def layout(self) -> Layout:
         """Layout of its values."""
         return Layout([len(self.axes)] * self.elements, [self.rotates] * self.elements)

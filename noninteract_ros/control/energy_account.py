@@ -7,6 +7,25 @@ import numpy as np
 
 from noninteract_ros.control.energy_tank import EnergyTank
 
+# What is told of an account, on the topic `energy`, in this order.
+QUANTITIES = (
+    "storage",
+    "supplied",
+    "dissipated",
+    "demand",
+    "tank",
+    "reserve",
+    "sigma",
+    "grip",
+    "residual",
+    "received",
+    "measured",
+    "brought",
+    "credit",
+    "refilled",
+    "lost",
+    "account",
+)
 ROUNDING = 16.0 * float(np.finfo(float).eps)  # of what was added up, for the residual
 
 

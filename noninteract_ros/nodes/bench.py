@@ -2,7 +2,7 @@
 """The parts of `noninteract bench` that need ROS: the controller's node, lockstep, wall time."""
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -12,20 +12,24 @@ import rclpy
 from rclpy.serialization import deserialize_message, serialize_message
 
 from noninteract_ros.analysis.bench import (
+    PARTS,
+    WARM_UP,
     BenchSettings,
     Material,
     Row,
     Timed,
+    bench_scenarios,
     take_turns,
 )
-from noninteract_ros.analysis.bench_law import PinocchioTerms
+from noninteract_ros.analysis.bench_law import PinocchioTerms, law_rows
+from noninteract_ros.analysis.bench_teams import bench_teams
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
+from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.bench_programs import (
     NAMESPACE,
     RoundTrip,
     command_times,
-    parameter_file,
     programs,
     ros,
     tick_times,
@@ -35,10 +39,11 @@ from noninteract_ros.nodes.controller import Controller
 from noninteract_ros.nodes.messages import SubtaskCodec, to_wrench_stamped
 from noninteract_ros.nodes.monitor import StackError
 from noninteract_ros.nodes.node import Ticker
-from noninteract_ros.nodes.parameter_files import rewrite
+from noninteract_ros.nodes.parameter_files import rewrite, write
 from noninteract_ros.scenario import Scenario
 
 ROUND_TRIP = "raw round trip of two processes"
+SCENARIO = "scenario.yaml"
 SLEEP = "absolute sleep alone, period error"
 
 
@@ -63,7 +68,7 @@ class ControllerCycle:
             task.name: SubtaskCodec(task.name, task.elements, task.axes, task.rotates)
             for task in self._stack.subtasks
         }
-        file = parameter_file({**values, "lockstep": True}, folder)
+        file = write(folder / SCENARIO, {**values, "lockstep": True})
         context = rclpy.Context()
         context.init(args=rewrite(["--ros-args", "--params-file", str(file)], folder))
         self._node = Controller(context=context, namespace=NAMESPACE)
@@ -131,15 +136,53 @@ def node_rows(name: str, values: Mapping[str, Any], material: Material, count: i
     return [Row("node", node, times[node], terms), Row("node", terms, times[terms])]
 
 
+def measure(
+    parts: Sequence[str],
+    settings: BenchSettings,
+    begin: Callable[[str], None],
+    leave_out: Callable[[str], None],
+) -> list[Row]:
+    """Rows of some parts, in the order of `PARTS`.
+
+    Args:
+        parts: Some of `PARTS`.
+        settings: How much is measured.
+        begin: Told what is measured next.
+        leave_out: Told which scenario is left out, and why.
+    """
+    scenarios = bench_scenarios()
+    paper, teams = scenarios["paper"], bench_teams() if "law" in parts else {}
+    rows: list[Row] = []
+    chosen = scenarios if {"law", "node"} & set(parts) else {}
+    for name, values in (chosen | teams).items():
+        begin(f"law and controller node, {name}")
+        try:
+            material = Material.of(values, settings.ticks + WARM_UP)
+        except ScenarioError as error:  # Models of robots are an extra.
+            leave_out(f"{name} is left out: {error}")
+            continue
+        if "law" in parts:
+            rows += law_rows(name, material, settings.ticks)
+        # Robots with topics of their own have no single state to be answered.
+        if "node" in parts and name not in teams and not material.scenario.own_states:
+            rows += node_rows(name, values, material, settings.ticks)
+    if "lockstep" in parts:
+        begin("lockstep of the real programs")
+        rows += lockstep_rows("paper", paper, settings)
+    if "wall" in parts:
+        begin("wall time")
+        rows += wall_rows("paper", paper, settings)
+    return sorted(rows, key=lambda row: PARTS.index(row.part))
+
+
 def lockstep_rows(name: str, values: Mapping[str, Any], settings: BenchSettings) -> list[Row]:
     """Wall time per tick of the real programs, without and with the recorder, and their floor."""
     scenario = Scenario.from_dict(values)
     things = {False: f"lockstep tick, {name}", True: f"lockstep tick, {name}, recorded"}
     times: dict[str, list[Array]] = {name: [] for name in (*things.values(), ROUND_TRIP)}
     with ros(), TemporaryDirectory() as folder:
-        file = parameter_file(
-            {**values, "lockstep": True, "end_time": 0.0, "start_paused": False}, Path(folder)
-        )
+        running = {"lockstep": True, "end_time": 0.0, "start_paused": False}
+        file = write(Path(folder) / SCENARIO, {**values, **running})
         trip = RoundTrip(scenario.build_team().joint_names)
         try:
             for _ in range(settings.rounds):
@@ -163,9 +206,8 @@ def wall_rows(name: str, values: Mapping[str, Any], settings: BenchSettings) -> 
     rate = scenario.general.rate
     times: dict[str, list[Array]] = {loop: [], SLEEP: []}
     with ros(), TemporaryDirectory() as folder:
-        file = parameter_file(
-            {**values, "lockstep": False, "end_time": 0.0, "start_paused": False}, Path(folder)
-        )
+        running = {"lockstep": False, "end_time": 0.0, "start_paused": False}
+        file = write(Path(folder) / SCENARIO, {**values, **running})
         for _ in range(settings.rounds):
             times[SLEEP].append(_errors(_sleeps(rate, settings.seconds), rate))
             with programs(scenario, file, Path(folder), False) as stack:

@@ -4,11 +4,10 @@
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import rclpy
@@ -26,7 +25,6 @@ from noninteract_ros.nodes.feed import Feed
 from noninteract_ros.nodes.messages import stamp_ns
 from noninteract_ros.nodes.monitor import StackError
 from noninteract_ros.nodes.node import LOOP_QOS
-from noninteract_ros.nodes.parameter_files import dump
 from noninteract_ros.nodes.stack import Processes, programs_of
 from noninteract_ros.scenario import Scenario
 
@@ -43,13 +41,6 @@ def ros() -> Iterator[None]:
         yield
     finally:
         rclpy.try_shutdown()
-
-
-def parameter_file(values: Mapping[str, Any], folder: Path) -> Path:
-    """A scenario's values as a file that programs are started with."""
-    file = folder / "scenario.yaml"
-    file.write_text(dump({"/**": {"ros__parameters": dict(values)}}))
-    return file
 
 
 class RoundTrip:

@@ -94,6 +94,12 @@ def dump(content: Mapping[str, Any]) -> str:
     return yaml.dump(_plain(content), Dumper=_Quoted, sort_keys=False)
 
 
+def write(file: Path, values: Mapping[str, Any]) -> Path:
+    """Writes a scenario's values as a file that programs are started with."""
+    file.write_text(dump({EVERY_NODE: {"ros__parameters": dict(values)}}))
+    return file
+
+
 def origin_of_key(arguments: Sequence[str], key: str) -> str | None:
     """What gives a key on a command line: an override, the last file that holds its block.
 

@@ -6,30 +6,12 @@ from std_msgs.msg import Float64MultiArray
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds
-from noninteract_ros.control.energy_account import Account
+from noninteract_ros.control.energy_account import QUANTITIES, Account
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.messages import EnergyCodec
 from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode
 
-LABELS = (
-    "time",
-    "storage",
-    "supplied",
-    "dissipated",
-    "demand",
-    "tank",
-    "reserve",
-    "sigma",
-    "grip",
-    "residual",
-    "received",
-    "measured",
-    "brought",
-    "credit",
-    "refilled",
-    "lost",
-    "account",
-)
+LABELS = ("time", *QUANTITIES)
 
 
 class TeamEnergy:

@@ -12,8 +12,8 @@ from rclpy.serialization import serialize_message
 
 from noninteract_ros.analysis.recording import RunWriter
 from noninteract_ros.analysis.run import Run
-from noninteract_ros.analysis.team_account import LABELS
 from noninteract_ros.clock import stamp, tick_stamp
+from noninteract_ros.control.energy_account import QUANTITIES
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.messages import (
     EnergyCodec,
@@ -108,7 +108,7 @@ class _Recording:
             SubtaskCodec(t.name, t.elements, t.axes, t.rotates) for t in stack.subtasks
         ]
         self._energy = EnergyCodec(ENERGY_LABELS)
-        self._account = EnergyCodec(("time", *LABELS))
+        self._account = EnergyCodec(("time", *QUANTITIES))
         self._measured = 0.0
         self._interventions = 0
         self._narrators = []
@@ -213,7 +213,7 @@ def told(change: Callable[[dict[str, float]], None]) -> Tamper:
 
     def tamper(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         if topic == "energy":
-            columns = dict(zip(("time", *LABELS), arrays[0], strict=True))
+            columns = dict(zip(("time", *QUANTITIES), arrays[0], strict=True))
             change(columns)
             return [np.array(list(columns.values()))]
         return arrays
