@@ -10,6 +10,7 @@ import pytest
 from planar_arms import UNLIKE, PlanarArms
 from test_structured import Pair, assert_close
 
+from noninteract_ros.control.decoupling import commanded_acceleration
 from noninteract_ros.control.gated_law import decoupling, gated_acceleration
 from noninteract_ros.control.impedance import ImpedanceSettings
 from noninteract_ros.control.reference import Reference
@@ -154,6 +155,25 @@ def test_half_open_gates_are_the_same_robot_by_robot(name):
             np.concatenate([gated_acceleration(*arguments[:2], added, tank), added.force])
         )
     assert_close(*found)
+
+
+@pytest.mark.parametrize("grip", [1.0, 0.7])
+@pytest.mark.parametrize("sigma", [0.0, 0.4, 1.0])
+def test_gates_mix_both_laws_with_the_springs_and_dampers_in_force(sigma, grip):
+    """sigma of noninteracting, the rest natural, both with nu of the stiffness and damping."""
+    pair = Pair("star of 8", 0)
+    dynamics, error, impedance = pair.dense.dynamics, pair.error, pair.impedance
+    tank = replace(Loop().core.gate.tank, sigma=sigma, grip=grip)
+    found = gated_acceleration(dynamics, error, decoupling(dynamics, error, impedance), tank)
+    assert np.isinf(impedance.max_force).all()  # So that a share of the stiffness is one of h.
+    weaker = replace(
+        impedance, stiffness=grip * impedance.stiffness, damping=grip * impedance.damping
+    )
+    natural, complete = (
+        commanded_acceleration(law, dynamics, error, weaker)
+        for law in ("natural", "noninteracting")
+    )
+    np.testing.assert_allclose(found, (1.0 - sigma) * natural + sigma * complete, rtol=1e-9)
 
 
 def test_references_that_jump_leave_the_gates_open():
