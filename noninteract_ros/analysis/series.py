@@ -2,7 +2,7 @@
 """Recorded messages of one topic as arrays over time.
 
 In all series: stamps are in seconds and each stands once (of messages with the same stamp, such
-as a state that was re-sent, the first is kept); rows are in the order of arrival. Names that
+as a state that was sent again, the first is kept); rows are in the order of arrival. Names that
 come and go between messages all have a column, NaN where a message lacks it. A field whose size
 does not fit the names is NaN as well: it was refused by whoever read it.
 """
@@ -52,6 +52,8 @@ class TrajectorySeries:
         linear_acceleration: Shape (n, elements, 3).
         angular_acceleration: Shape (n, elements, 3).
         markers: Stamps of the messages without points, shape (m,).
+        contradicted: Stamps at which messages tell different things, shape (k,). A message that
+            only repeats another one, byte by byte, contradicts nothing.
     """
 
     names: tuple[str, ...]
@@ -63,6 +65,7 @@ class TrajectorySeries:
     linear_acceleration: Array
     angular_acceleration: Array
     markers: Array
+    contradicted: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,6 +150,7 @@ def trajectory_series(messages: list[bytes]) -> TrajectorySeries:
         linear_acceleration=accelerations[..., :3],
         angular_acceleration=accelerations[..., 3:],
         markers=markers[_first_of_each(markers)],
+        contradicted=_contradicted(messages, table.stamps),
     )
 
 
@@ -221,3 +225,10 @@ def _first_of_each(stamps: Array) -> NDArray[np.intp]:
     """Rows, in order, that are the first with their stamp."""
     _, first = np.unique(stamps, return_index=True)
     return np.sort(first)
+
+
+def _contradicted(messages: list[bytes], stamps: Array) -> Array:
+    """Stamps that different messages have, shape (k,)."""
+    told = set(zip(stamps.tolist(), messages, strict=True))
+    values, counts = np.unique([stamp for stamp, _ in told], return_counts=True)
+    return np.asarray(values[counts > 1], dtype=np.float64)

@@ -1,19 +1,26 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each check passes on a sound run and fails on one that is broken in its respect."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
-from rehearsed import DIAGNOSTICS, WRENCH, Tamper, record, scenario_values
+from rehearsed import DIAGNOSTICS, MOTION, WRENCH, Tamper, record, reference, scenario_values
 
 from noninteract_ros.analysis.checks import Check
 from noninteract_ros.analysis.metrics import Findings, measure
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.recording import RunWriter
 from noninteract_ros.errors import RecordingError
-from noninteract_ros.nodes.messages import Level, to_diagnostics, to_status, to_wrench_stamped
+from noninteract_ros.nodes.messages import (
+    Level,
+    SubtaskCodec,
+    to_diagnostics,
+    to_status,
+    to_wrench_stamped,
+)
 
 
 def findings(folder: Path, tamper: Tamper | None = None, **changes: object) -> Findings:
@@ -165,6 +172,39 @@ def test_the_other_source_may_say_what_it_likes(tmp_path: Path) -> None:
     assert found["noninteraction.autonomy"].passed is None
     assert found["noninteraction.human"].passed
     assert found["closed_form.relative"].passed
+
+
+def again(change: float) -> Callable[[RunWriter], None]:
+    """Says one of autonomy's references a second time, late, with another position or the same."""
+    codec = SubtaskCodec("relative", ("robot_1-robot_2",), ("x", "y"), False)
+    position = np.array([1.0 + change, 1.0])
+
+    def say(writer: RunWriter) -> None:
+        data = reference(codec, 0.4, position)
+        writer.add("/team/relative/autonomy/reference", MOTION, int(6e8), int(6e8), data)
+
+    return say
+
+
+def test_a_reference_that_is_said_again_changes_nothing(tmp_path: Path) -> None:
+    """As a source does that saw a state twice: the same bytes for the same instant."""
+    run = record(tmp_path, scenario_values(), 1.2, extra=again(0.0))
+    topic = "relative/autonomy/reference"
+    assert len(run.log_times(topic)) == len(run.trajectory(topic).stamps) + 1
+    found = measure(Recorded(run), other_laws=False)
+    assert found.metrics["run"]["not_in_the_scenario"] == []
+    by_name = checks(found)
+    for name in ("closed_form.relative", "reproduction", "noninteraction.autonomy"):
+        assert by_name[name].passed
+
+
+def test_two_references_for_one_instant_are_another_thing(tmp_path: Path) -> None:
+    """Nobody knows which of them led the team: no claim that needs to know is judged."""
+    run = record(tmp_path, scenario_values(), 1.2, extra=again(1e-9))
+    found = checks(measure(Recorded(run), other_laws=False))
+    for name in ("closed_form.relative", "reproduction", "noninteraction.human"):
+        assert found[name].passed is None
+        assert "different references for the same instant" in found[name].reason
 
 
 def test_in_wall_time_only_what_holds_there_is_claimed(tmp_path: Path) -> None:
