@@ -222,6 +222,7 @@ class EnergyGate:
             reserve=old.reserve,
             sigma=old.sigma,
             grip=old.grip,
+            owed=old.owed,
         )
         tank = tank if law == GATED else observed(tank, SIGMAS[law])
         start = kinetic + tank.grip * potential + tank.reserve + tank.level

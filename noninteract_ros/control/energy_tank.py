@@ -47,7 +47,7 @@ class TankSettings:
         live=True,
     )
     reopening_level: float = key(
-        "Level that the tank must have regained before sigma rises [J]",
+        "Level from which sigma rises again, once what is between it and full_gate has come in [J]",
         1.0,
         minimum=0.0,
         live=True,
@@ -69,13 +69,13 @@ class TankSettings:
         """Refuses levels that could never be reached or that would let sigma breathe.
 
         Raises:
-            ScenarioError: Not initial <= capacity, full_gate <= reopening_level <= capacity.
+            ScenarioError: Not initial <= capacity, full_gate < reopening_level <= capacity.
         """
         if self.initial > self.capacity:
             allowed = f"<= capacity ({self.capacity:g})"
             raise ScenarioError("tank.initial", self.initial, allowed)
-        if not self.full_gate <= self.reopening_level <= self.capacity:
-            allowed = f"between full_gate ({self.full_gate:g}) and capacity ({self.capacity:g})"
+        if not self.full_gate < self.reopening_level <= self.capacity:
+            allowed = f"above full_gate ({self.full_gate:g}), <= capacity ({self.capacity:g})"
             raise ScenarioError("tank.reopening_level", self.reopening_level, allowed)
 
 
@@ -89,6 +89,8 @@ class EnergyTank(Generic[Amount]):
         reserve: R, energy for the impedance's own sampling errors [J].
         sigma: Gate of the decoupling, 0 to 1.
         grip: Gate nu of the impedance, 0 to 1; exactly 1 while half of the reserve is there.
+        owed: Energy that must come in before sigma may rise [J]; what the decoupling returns of
+            the energy that it was lent does not count.
         potential: U at the last step [J].
         lost: Energy withheld or spilt since the start [J]; never falls.
         granted: Credit given for references since the start [J].
@@ -101,6 +103,7 @@ class EnergyTank(Generic[Amount]):
     reserve: Amount
     sigma: Amount
     grip: Amount
+    owed: Amount
     potential: Amount
     lost: Amount
     granted: Amount
@@ -144,6 +147,7 @@ def full_tank(settings: TankSettings, potential: Amount) -> EnergyTank[Amount]:
         none + settings.reserve,
         none + 1.0,
         none + 1.0,
+        none,
         potential,
         none,
         none,
@@ -154,11 +158,11 @@ def full_tank(settings: TankSettings, potential: Amount) -> EnergyTank[Amount]:
 
 
 def refill(tank: EnergyTank[Amount], settings: TankSettings) -> EnergyTank[Amount]:
-    """Fills tank and reserve on purpose; the gates open at their own rates."""
+    """Fills tank and reserve on purpose; nothing is owed, the gates open at their own rates."""
     level = _greater(tank.level, settings.capacity)
     reserve = _greater(tank.reserve, settings.reserve)
     refilled = tank.refilled + (level - tank.level) + (reserve - tank.reserve)
-    return replace(tank, level=level, reserve=reserve, refilled=refilled)
+    return replace(tank, level=level, reserve=reserve, owed=0.0 * level, refilled=refilled)
 
 
 def revalue(tank: EnergyTank[Amount], potential: Amount) -> EnergyTank[Amount]:
@@ -191,12 +195,13 @@ def step(
     tank = _credit(_book(tank, interval, settings), interval, settings)
     purse = tank.reserve + tank.grip * interval.potential
     grip = _unit(purse / (interval.potential + 0.5 * settings.reserve))
-    sigma = _gate(tank, interval, settings)
+    sigma, owed = _gate(tank, interval, settings)
     return replace(
         tank,
         grip=grip,
         reserve=purse - grip * interval.potential,  # A spring that yields gives back its energy.
         sigma=sigma,
+        owed=owed,
         potential=interval.potential,
     )
 
@@ -215,12 +220,18 @@ def _book(
     absorbed = -interval.impedance_work - tank.grip * (interval.arrived - tank.potential)
     reserve = tank.reserve + absorbed
     surplus = _greater(reserve - settings.reserve, 0.0)
-    spent = tank.level - interval.decoupling_work
-    offered = spent + settings.refill_fraction * surplus
+    share = settings.refill_fraction * surplus
+    offered = tank.level - interval.decoupling_work + share
     # Credit lapses as the motion that it was granted for decays.
     level = _less(offered, settings.capacity + 2.0 * settings.reference_credit * interval.storage)
-    lost = (1.0 - settings.refill_fraction) * surplus + (offered - level)
-    return replace(tank, reserve=reserve - surplus, level=level, lost=tank.lost + lost)
+    lost = (surplus - share) + (offered - level)
+    return replace(
+        tank,
+        reserve=reserve - surplus,
+        level=level,
+        owed=_greater(tank.owed - share, 0.0),
+        lost=tank.lost + lost,
+    )
 
 
 def _credit(
@@ -234,20 +245,28 @@ def _credit(
     return replace(
         tank,
         level=tank.level + credit,
+        owed=_greater(tank.owed - credit, 0.0),
         granted=tank.granted + credit,
         brought=brought,
         peak=peak,
     )
 
 
-def _gate(tank: EnergyTank[Amount], interval: Interval[Amount], settings: TankSettings) -> Amount:
+def _gate(
+    tank: EnergyTank[Amount], interval: Interval[Amount], settings: TankSettings
+) -> tuple[Amount, Amount]:
+    """Sigma for the next tick, and what must come in before it may rise."""
     needed = settings.full_gate + settings.look_ahead * abs(interval.demand)
     wanted = _unit(tank.level / needed)
     # What an unstable motion returns on its way back must not reopen the gate.
-    shut = tank.level < settings.reopening_level
+    short = tank.level < settings.reopening_level
+    shut = short | (tank.owed > 0.0)
     highest = tank.sigma + settings.opening_rate * interval.step * (1.0 - shut)
     lowest = tank.sigma - settings.closing_rate * interval.step
-    return _less(_greater(wanted, lowest), highest)
+    sigma = _less(_greater(wanted, lowest), highest)
+    closes = short & (sigma < tank.sigma)
+    quantum = settings.reopening_level - settings.full_gate
+    return sigma, _greater(tank.owed, quantum * closes)
 
 
 def _unit(value: Amount) -> Amount:

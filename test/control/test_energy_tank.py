@@ -163,13 +163,13 @@ def test_many_accounts_at_once_are_each_alone():
         alone = [advance(t, i, SETTINGS) for t, i in zip(alone, intervals, strict=True)]
         rows = zip(*(astuple(interval) for interval in intervals), strict=True)
         together = advance(together, Interval(*map(np.array, rows)), SETTINGS)
-        for name in ("level", "reserve", "sigma", "grip", "lost", "granted", "brought"):
+        for name in ("level", "reserve", "sigma", "grip", "owed", "lost", "granted", "brought"):
             expected = [getattr(tank, name) for tank in alone]
             np.testing.assert_array_equal(getattr(together, name), expected)
 
 
 @pytest.mark.parametrize(
-    "values", [{"initial": 3.0}, {"reopening_level": 0.1}, {"reopening_level": 2.5}]
+    "values", [{"initial": 3.0}, {"reopening_level": 0.25}, {"reopening_level": 2.5}]
 )
 def test_levels_that_do_not_fit_together_are_refused(values):
     """Levels that cannot be reached, or that would let sigma breathe, are named."""
@@ -177,18 +177,63 @@ def test_levels_that_do_not_fit_together_are_refused(values):
         TankSettings(**values).check()
 
 
-def test_a_gate_that_has_closed_stays_until_the_tank_has_regained_its_level():
-    """Sigma falls with the tank and rises again only from the reopening level on."""
+def closed_by_half():
+    """A tank whose level let sigma fall to one half."""
     tank = tank_with(0.5 * SETTINGS.full_gate)
     for _ in range(20):
         tank = advance(tank, STILL, SETTINGS)
     assert tank.sigma == 0.5
-    regained = replace(STILL, decoupling_work=-0.9 * SETTINGS.reopening_level + tank.level)
-    tank = advance(tank, regained, SETTINGS)
-    assert tank.level == pytest.approx(0.9 * SETTINGS.reopening_level)
+    return tank
+
+
+def test_a_gate_that_has_closed_stays_until_the_tank_has_regained_its_level():
+    """Sigma falls with the tank and rises again only from the reopening level on."""
+    tank = closed_by_half()
+    short = SETTINGS.reopening_level - tank.level
+    for share, open_again in ((0.9, False), (0.2, True)):
+        damped = -share * short / SETTINGS.refill_fraction
+        tank = advance(tank, replace(STILL, impedance_work=damped), SETTINGS)
+        assert (tank.sigma > 0.5) == open_again
+        assert (tank.level >= SETTINGS.reopening_level) == open_again
+
+
+def test_what_the_decoupling_returns_does_not_reopen_its_gate():
+    """A loan that comes back fills the tank to the brim, and sigma stays until more comes in."""
+    tank = advance(closed_by_half(), replace(STILL, decoupling_work=-10.0), SETTINGS)
+    assert tank.level == SETTINGS.capacity
     assert tank.sigma == 0.5
-    tank = advance(tank, replace(STILL, decoupling_work=-0.2), SETTINGS)
-    assert tank.sigma > 0.5
+    quantum = SETTINGS.reopening_level - SETTINGS.full_gate
+    damped = replace(STILL, impedance_work=-1.01 * quantum / SETTINGS.refill_fraction)
+    led = replace(STILL, input_work=1.01 * quantum, storage=10.0)
+    assert advance(tank, damped, SETTINGS).sigma > 0.5
+    assert advance(tank, led, SETTINGS).sigma > 0.5
+    assert advance(refill(tank, SETTINGS), STILL, SETTINGS).sigma > 0.5
+
+
+def test_a_demand_beyond_a_full_tank_owes_nothing():
+    """What only the power wanted for a moment has closed opens when it is over."""
+    tank = advance(tank_with(SETTINGS.capacity), replace(STILL, demand=1000.0), SETTINGS)
+    assert tank.sigma < 1.0
+    assert advance(tank, STILL, SETTINGS).sigma > tank.sigma
+
+
+def test_reopenings_are_bounded_by_what_came_in():
+    """Whatever lends and returns, each reopening after a shortage has cost a whole quantum."""
+    tank, came_in, reopenings, falling = tank_with(1.0), 0.0, 0, True
+    rng = np.random.default_rng(11)
+    for _ in range(30_000):
+        lent = float(rng.normal(0.1 * (tank.level - 0.6), 0.2))
+        damped = float(rng.uniform(0.0, 0.02))
+        booked = replace(STILL, decoupling_work=lent, impedance_work=-damped)
+        after = advance(tank, booked, SETTINGS)
+        came_in += SETTINGS.refill_fraction * damped
+        if after.owed > tank.owed:
+            falling = True
+        elif after.sigma > tank.sigma and falling:
+            reopenings, falling = reopenings + 1, False
+        tank = after
+    quantum = SETTINGS.reopening_level - SETTINGS.full_gate
+    assert 50 < reopenings <= came_in / quantum
 
 
 class Door:
