@@ -30,6 +30,7 @@ class TeamAccount:
         dissipated: Power that the impedance takes [W].
         demand: Power that complete decoupling would inject [W].
         tank: Energy in the tank [J].
+        owed: Energy that must come in before sigma may rise [J].
         reserve: Energy in the reserve [J].
         sigma: Gate of the decoupling.
         grip: Gate of the impedance.
@@ -49,6 +50,7 @@ class TeamAccount:
     dissipated: Array
     demand: Array
     tank: Array
+    owed: Array
     reserve: Array
     sigma: Array
     grip: Array

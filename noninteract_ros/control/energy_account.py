@@ -14,6 +14,7 @@ QUANTITIES = (
     "dissipated",
     "demand",
     "tank",
+    "owed",
     "reserve",
     "sigma",
     "grip",

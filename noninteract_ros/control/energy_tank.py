@@ -47,7 +47,7 @@ class TankSettings:
         live=True,
     )
     reopening_level: float = key(
-        "Level from which sigma rises again, once what is between it and full_gate has come in [J]",
+        "Level from which sigma rises, when what it is above full_gate has come in anew [J]",
         1.0,
         minimum=0.0,
         live=True,

@@ -76,6 +76,6 @@ class SafetyWatch:
 def _gates(account: Account) -> Iterator[str]:
     """What the energy account holds back."""
     if account.gated and account.tank.sigma < 1.0:
-        yield "energy tank low: decoupling reduced, ~/refill restores it"
+        yield "decoupling reduced since the energy tank was low: damping or ~/refill restores it"
     if account.gated and account.tank.grip < 1.0:
         yield "energy reserve low: impedance yields"

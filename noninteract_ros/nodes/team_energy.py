@@ -55,6 +55,7 @@ class TeamEnergy:
             account.dissipated,
             account.demand,
             tank.level,
+            tank.owed,
             tank.reserve,
             tank.sigma,
             tank.grip,
@@ -77,6 +78,7 @@ def told(account: Account) -> dict[str, object]:
         "sigma": tank.sigma,
         "grip": tank.grip,
         "tank [J]": tank.level,
+        "owed [J]": tank.owed,
         "reserve [J]": tank.reserve,
         "residual [J]": account.residual,
     }

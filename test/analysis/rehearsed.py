@@ -197,7 +197,7 @@ class _Recording:
         self._measured += supplied * self._period / self._rate
         values = (
             now / 1e9, account.storage, supplied, account.dissipated, account.demand, tank.level,
-            tank.reserve, tank.sigma, tank.grip, account.residual, account.received,
+            tank.owed, tank.reserve, tank.sigma, tank.grip, account.residual, account.received,
             self._measured, tank.brought, tank.granted, tank.refilled, tank.lost, account.number,
         )  # fmt: skip
         self._add("energy", LABELLED, now, self._account.encode, np.array(values, dtype=float))

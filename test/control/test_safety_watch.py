@@ -36,7 +36,10 @@ def tick(
         ({}, []),
         ({"law_share": 0.4}, ["near a singularity: recovering"]),
         ({"effort_share": 0.9}, ["at effort limits"]),
-        ({"sigma": 0.99}, ["energy tank low: decoupling reduced, ~/refill restores it"]),
+        (
+            {"sigma": 0.99},
+            ["decoupling reduced since the energy tank was low: damping or ~/refill restores it"],
+        ),
         ({"grip": 0.99}, ["energy reserve low: impedance yields"]),
         ({"clipped": True}, ["at effort limits"]),
         ({"repelled": (0,)}, ["left/joint_1 at its position limit"]),

@@ -42,7 +42,7 @@ def test_the_door_s_account_is_told_tick_by_tick(ros: Ros) -> None:
     accounts = Accounts(ros)
     stack = ros.stack(door()).begin()
     stack.run_until(3.0)
-    until(stack.ear.says("controller", "energy tank low"), "the warning")
+    until(stack.ear.says("controller", "energy tank was low"), "the warning")
     assert stack.ear.status["controller"][0] == 1
     rows = list(accounts.rows)
     assert rows[0]["sigma"] == 1.0
