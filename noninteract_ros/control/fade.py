@@ -7,14 +7,10 @@ from noninteract_ros.arrays import Array
 
 
 class Fade:
-    """Adds what was in force before a change, less what is in force after it, for a while.
+    """Adds what was in force before a change, less what is in force after it, for a while."""
 
-    Args:
-        duration: How long it takes [s].
-    """
-
-    def __init__(self, duration: float) -> None:
-        self._duration = duration
+    def __init__(self) -> None:
+        self._duration = 1.0
         self._difference: Array = np.zeros(0)
         self.forget()
 
@@ -22,9 +18,9 @@ class Fade:
         """Ends at once."""
         self._start = -np.inf
 
-    def begin(self, now: float, difference: Array) -> None:
-        """Starts with a difference, shape (n,), at a time [s]."""
-        self._difference, self._start = difference, now
+    def begin(self, now: float, difference: Array, duration: float) -> None:
+        """Starts with a difference, shape (n,), at a time [s], for a duration [s]."""
+        self._difference, self._start, self._duration = difference, now, duration
 
     def added_to(self, wanted: Array, now: float) -> Array:
         """With what is left of the difference; after the duration the very same array, (n,)."""

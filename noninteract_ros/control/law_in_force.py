@@ -10,6 +10,7 @@ from noninteract_ros.control.fade import Fade
 from noninteract_ros.control.force_goal import ForceGoals
 from noninteract_ros.control.gated_law import decoupling, gated_acceleration
 from noninteract_ros.control.joint_safety import SafetyReport
+from noninteract_ros.control.stop import Stop
 from noninteract_ros.control.team_view import Seen, TeamView
 from noninteract_ros.control.tick import Mode
 
@@ -25,15 +26,20 @@ class LawInForce:
 
     Attributes:
         left: Mode that a change has left since the last tick, or None.
-        fade: What is left of the bump of the last change.
     """
 
     def __init__(
         self, gate: EnergyGate, goals: ForceGoals, transition_time: float, stop_rate: float
     ) -> None:
-        self._gate, self._goals, self._stop_rate = gate, goals, stop_rate
-        self.fade = Fade(transition_time)
+        self._gate, self._goals = gate, goals
+        self._transition_time = transition_time
+        self._fade, self._stop = Fade(), Stop(stop_rate)
         self.left: Mode | None = None
+
+    def forget(self) -> None:
+        """The team's clock starts anew: nothing fades any more."""
+        self._fade.forget()
+        self._stop.forget()
 
     def blended(
         self,
@@ -55,9 +61,11 @@ class LawInForce:
             recovery: Joint acceleration of the recovery from a singularity, shape (n,).
         """
         dynamics, v = seen.dynamics, seen.state.v
+        if mode.stopped and self.left is not None and not self.left.stopped:
+            self._stop.begin(moment.now)
         if share == 0.0:  # The law is not even defined at a singularity; what fades starts over.
             self.left = None
-            self.fade.forget()
+            self._fade.forget()
             return dynamics.acceleration_of(v, recovery), recovery
         acceleration = self._acceleration(mode, view, seen, moment)
         wanted = dynamics.joint_acceleration(v, acceleration)
@@ -77,15 +85,21 @@ class LawInForce:
             added = decoupling(dynamics, error, impedance)
             was = replace(moment, error=error, dynamics=dynamics, impedance=impedance, added=added)
             before = self._wanted(self.left, v, was)
-            self.fade.begin(now, self.fade.added_to(before, now) - wanted)
+            self._fade.begin(now, self._fade.added_to(before, now) - wanted, self._fading(mode))
             self.left = None
-        return self.fade.added_to(wanted, now)
+        return self._fade.added_to(wanted, now)
+
+    def _fading(self, mode: Mode) -> float:
+        """How long what was in force before a change fades out [s]."""
+        # An acceleration of before must not lead a team on that is to come to rest.
+        shorter = self._stop.ramp_time if mode.stopped else self._transition_time
+        return min(shorter, self._transition_time)
 
     def _wanted(self, mode: Mode, v: Array, moment: Moment) -> Array:
         """What a mode asks for by itself."""
         dynamics, error, added = moment.dynamics, moment.error, moment.added
         if mode.stopped:
-            return dynamics.acceleration_of(v, -self._stop_rate * v)
+            return dynamics.acceleration_of(v, -self._stop.damping(moment.now) * v)
         if mode.law == "energy_gated":
             return gated_acceleration(dynamics, error, added, self._gate.tank)
         if mode.law == "noninteracting":

@@ -43,7 +43,7 @@ class TeamController:
         impedances: Gains, by subtask in the stack's order.
         inputs: Authority, timeouts and limits, in the same order.
         transition_time: How long a change of law or gains fades in [s].
-        stop_rate: Decay rate of the velocity after a stop [1/s].
+        stop_rate: Decay rate of the velocity after a stop, once it is in full force [1/s].
         state_timeout: Gap between states after which every subtask starts anew [s].
         safety: Behaviour at singularities and joint limits.
         tank: Capacity, levels and rates of the energy account.
@@ -59,7 +59,7 @@ class TeamController:
         impedances: Sequence[ImpedanceSettings],
         inputs: Sequence[InputSettings],
         transition_time: float = 0.2,
-        stop_rate: float = 10.0,
+        stop_rate: float = 50.0,
         state_timeout: float = 0.2,
         safety: SafetySettings = DEFAULT_SAFETY,
         tank: TankSettings = DEFAULT_TANK,
@@ -146,7 +146,7 @@ class TeamController:
     def reset(self) -> None:
         """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
         self._continuity.forget()
-        self._law.fade.forget()
+        self._law.forget()
         self._forget_motion()
         self.gate.restart()
         self._safety.reset()

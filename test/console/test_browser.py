@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
 REST = 0.5  # [s] given to the team to come to rest
-STOP = 0.8  # [s] the same after a stop, whose velocities fall by `stop_rate`, here 10 1/s
 PUSH = {
     "subtask": "cooperative",
     "element": 0,
@@ -192,7 +191,7 @@ def test_the_space_key_stops_and_the_stop_is_latched(show: Show, page: Page) -> 
     press_pad(page, 0.0, 0.4)
     show.moves()
     page.locator("input[data-gain]").first.focus()
-    assert show.rest_after(lambda: page.keyboard.press("Space")) < STOP
+    assert show.rest_after(lambda: page.keyboard.press("Space")) < REST
     wait(page, "operatorConsole.status().stopped")
     page.mouse.move(400, 300)
     shoot(page, "stopped")

@@ -129,7 +129,7 @@ def test_states_of_different_times_cost_what_the_prediction_does(
 
 def test_a_late_robot_holds_the_whole_team_until_it_is_back(halls: Any) -> None:
     """Who is late is said; the others brake; nobody is pulled when it returns."""
-    hall = halls(cooperative={"takeover": "direct"}, stop_rate=50.0)
+    hall = halls(cooperative={"takeover": "direct"})
     for tick in range(300):
         lead(hall, 1e-3 * tick)
         hall.tell("left", "right")
