@@ -170,14 +170,17 @@ def repair(
 @app.command()
 def check(
     target: Annotated[
-        str, typer.Argument(help="Name or file of a scenario, or: identities, gauntlet.")
+        str, typer.Argument(help="Name or file of a scenario, or: identities, delay, gauntlet.")
     ],
     others: Annotated[
         list[str] | None,
         typer.Argument(help="Scenarios of identities; or all. With --json, gauntlet: a file."),
     ] = None,
     samples: Annotated[
-        int | None, typer.Option("--states", "--samples", min=1, help="Number of random states.")
+        int | None,
+        typer.Option(
+            "--states", "--samples", min=1, help="Number of random states, or of seeds (delay)."
+        ),
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random states.")] = 0,
     as_json: Annotated[bool, typer.Option("--json", help="JSON instead of tables.")] = False,

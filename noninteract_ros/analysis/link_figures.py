@@ -24,7 +24,8 @@ def link_figure(recorded: Recorded, account: LabelledSeries) -> Figure:
         ports.plot(t, account[f"{port}_out"], color=colour, linestyle="--", label=f"{name}: out")
     balance.plot(t, operator_net(account), color=COLOURS[0], label="put in by the operator, net")
     if link and link.passivity != "none":
-        balance.axhline(-link.reserve, color=COLOURS[1], linestyle="--", label="bound")
+        bound = -link.reserve - account["surprise"]
+        balance.plot(t, bound, color=COLOURS[1], linestyle="--", label="bound")
     for colour, (end, name) in zip(COLOURS, (("device", "device"), PORTS[1]), strict=False):
         level = account[f"{end}_budget"]
         # Without observers there is no end to what may be spent.

@@ -8,7 +8,7 @@ from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.series import LabelledSeries
 from noninteract_ros.arrays import Array
 
-SLACK = 1e-3  # [J] that the device's force does within a tick before it is observed
+ROUNDING = 1e-9  # [J]
 
 
 def link_account(recorded: Recorded) -> LabelledSeries | None:
@@ -25,7 +25,9 @@ def operator_net(account: LabelledSeries) -> Array:
 
 
 def link_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
-    """Energies at the end, and whether the operator ever drew more than the reserve.
+    """Energies at the end, and whether the operator ever drew more than the bound.
+
+    The bound is the reserve and what single ticks can have overdrawn before they were observed.
 
     A link without a passivity layer promises nothing: its energies are told, not judged.
     """
@@ -38,6 +40,10 @@ def link_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
     metrics = {**energies, "least_operator_net_J": least, "lost": int(account["lost"][-1])}
     if link.passivity == "none":
         return {"link": metrics}, []
-    metrics["least_device_budget_J"] = float(account["device_budget"].min())
-    bound = -link.reserve - SLACK
-    return {"link": metrics}, [at_least("link.operator_net", least, bound, "J")]
+    debt, surprise = float(account["device_budget"].min()), float(account["surprise"][-1])
+    metrics |= {"least_device_budget_J": debt, "surprise_J": surprise}
+    bound = -link.reserve - surprise - ROUNDING
+    return {"link": metrics}, [
+        at_least("link.operator_net", least, bound, "J"),
+        at_least("link.device_budget", debt, -surprise - ROUNDING, "J"),
+    ]

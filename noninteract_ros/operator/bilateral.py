@@ -5,6 +5,7 @@ One tick: the feedback is sent off, what has arrived at the device acts on the h
 that results is sent off, what has arrived at the team's end becomes the reference.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -20,11 +21,11 @@ from noninteract_ros.operator.link_settings import LinkSettings
 from noninteract_ros.operator.time_domain_passivity import ObservedDevice, ObservedTeam
 from noninteract_ros.subtasks.layout import Layout
 
-LONGEST_GAP = 0.1  # [s] after a longer one without samples the link starts anew
+LONGEST_GAP = 0.1  # [s] after a longer one without samples the link is taken up again
 
 
 class LinkAccount(NamedTuple):
-    """The energy account of a link since it began.
+    """The energy account of a link since the run began.
 
     Attributes:
         operator_in: Energy that the hand has put in [J].
@@ -33,6 +34,7 @@ class LinkAccount(NamedTuple):
         team_out: Energy that it has given back [J].
         device_budget: What the device may still give to the hand [J].
         team_budget: What may still be given to the team's impedance [J].
+        surprise: How far motions that the device's end did not expect can have overdrawn it [J].
         lost: Packets that never arrive, both ways.
     """
 
@@ -42,11 +44,12 @@ class LinkAccount(NamedTuple):
     team_out: float
     device_budget: float
     team_budget: float
+    surprise: float
     lost: float
 
     @property
     def operator_net(self) -> float:
-        """Energy put in by the hand less what it got out [J]; passive: never below -reserve."""
+        """Energy put in by the hand less what it got out [J]: at least -(reserve + surprise)."""
         return self.operator_in - self.operator_out
 
 
@@ -85,6 +88,7 @@ class BilateralLink:
         self._to_team: Channel[Packet] = Channel(settings, 0)
         self._to_device: Channel[Packet] = Channel(settings, 1)
         self._index: int | None = None
+        self._latest = math.inf
 
     @property
     def account(self) -> LinkAccount | None:
@@ -99,6 +103,7 @@ class BilateralLink:
             team.taken,
             self._device_end.budget.level,
             self._team_end.budget.level,
+            self._device_end.surprise,
             float(self._to_team.lost + self._to_device.lost),
         )
 
@@ -139,24 +144,33 @@ class BilateralLink:
         return self._device.silent_until(t)
 
     def _begin(self, index: int) -> Reference | None:
+        """Starts where the device is; after a break with the energy that was left."""
         motion = self._device.sample(index / self._rate)
         if motion is None:
             self._index = None
             return None
-        self._index, self._motion, self._reference = index, motion, motion
         self._to_team.reset()
         self._to_device.reset()
-        period = 1.0 / self._rate
-        self._device_end = ObservedDevice(self._settings, self._metric, period)
-        self._team_end = ObservedTeam(self._settings, self._layout, self._metric, period, motion)
+        if index < self._latest:
+            self._new_ends(motion)
+        self._device_end.resume()
+        self._team_end.resume(motion)
+        self._index = self._latest = index
+        self._motion = self._reference = motion
         return motion
+
+    def _new_ends(self, motion: Reference) -> None:
+        settings, period = self._settings, 1.0 / self._rate
+        limited = self._device.limited
+        self._device_end = ObservedDevice(settings, self._metric, period, limited)
+        self._team_end = ObservedTeam(settings, self._layout, self._metric, period, motion)
 
     def _tick(self, tick: int, feedback: Array) -> Reference | None:
         now, later = tick / self._rate, (tick + 1) / self._rate
         self._to_device.send(now, self._team_end.packet(feedback))
         for packet in self._to_device.receive(now):
             self._device_end.hear(packet)
-        force = self._device.limited(self._device_end.force(self._motion.velocity))
+        force = self._device_end.force(self._motion.velocity)
         motion = self._device.sample(later, force)
         if motion is None:
             self._index = None
@@ -165,6 +179,7 @@ class BilateralLink:
         self._to_team.send(later, self._device_end.moved(force, way, motion))
         for packet in self._to_team.receive(later):
             self._team_end.hear(packet)
-        self._index, self._motion = tick + 1, motion
+        self._index = self._latest = tick + 1
+        self._motion = motion
         self._reference = self._team_end.advance(feedback)
         return self._reference

@@ -49,11 +49,11 @@ class Budget:
             self.level = min(self.level + energy - self._announced, self._capacity)
             self._announced = energy
 
-    def repay(self, energy: float) -> float:
-        """Makes good an overdrawn level with energy [J]; returns what is left of it."""
-        debt = min(energy, max(-self.level, 0.0))
-        self.level += debt
-        return energy - debt
+    def keep(self, energy: float, level: float) -> float:
+        """Saves energy [J] until the level is as high as `level`; returns what is left of it."""
+        saved = min(energy, max(level - self.level, 0.0))
+        self.level += saved
+        return energy - saved
 
 
 class Newest:

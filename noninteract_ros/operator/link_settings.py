@@ -30,6 +30,11 @@ class LinkSettings:
     )
     reserve: float = key("Energy that the team's end may spend beforehand [J]", 0.1, minimum=0.0)
     capacity: float = key("Most energy that an end saves for later [J]", 1.0, positive=True)
+    kept: float = key(
+        "What the device's end keeps of the energy that it takes up, for its own swings [J]",
+        0.02,
+        minimum=0.0,
+    )
     filling: float = key(
         "tdpa: damping of the device while the team's end has less than the reserve [N s/m]",
         10.0,

@@ -2,6 +2,7 @@
 """Where energy enters and leaves a connection."""
 
 import numpy as np
+from scipy.optimize import brentq
 
 from noninteract_ros.arrays import Array
 
@@ -41,6 +42,46 @@ def without_excess(effort: Array, flow: Array, metric: Array, limit: float) -> A
         return effort
     direction = metric * flow
     return effort - (excess / max(float(direction @ flow), TINY)) * direction
+
+
+def affordable(effort: Array, way: Array, metric: Array, doubt: float, limit: float) -> Array:
+    """The nearest force whose work stays within a limit wherever the displacement ends.
+
+    The displacement is known up to a doubt d: it lies in the ball |way' - way| <= d. With lengths
+    |way|^2 = way' G way of displacements and |f|^2 = f' G^-1 f of forces, the work is at most
+    f' way + d |f|. That is convex in f, and its Lagrange condition is f (1 + l d / |f|) =
+    effort - l G way: damping l is taken off, then the rest is shortened by l d. The least l >= 0
+    that meets the limit gives the nearest force.
+
+    Args:
+        effort: Wanted force, shape (p,).
+        way: Expected displacement, shape (p,).
+        metric: G, positive, shape (p,).
+        doubt: d, not negative.
+        limit: Most work, not negative.
+    """
+    drag = metric * way
+    work, size = float(effort @ way), float(effort @ (effort / metric))
+    if work + doubt * np.sqrt(size) <= limit:
+        return effort
+    length = float(drag @ way)
+
+    def share(damping: float) -> float:
+        left = np.sqrt(max(size - damping * (2.0 * work - damping * length), 0.0))
+        return max(1.0 - damping * doubt / max(left, TINY), 0.0)
+
+    def excess(damping: float) -> float:
+        left = np.sqrt(max(size - damping * (2.0 * work - damping * length), 0.0))
+        return share(damping) * (work - damping * length + doubt * left) - limit
+
+    most = 1.0
+    while excess(most) > 0.0:
+        most *= 2.0
+        if not np.isfinite(most * most * length):
+            return np.zeros_like(effort)
+    damping = brentq(excess, 0.0, most)
+    result: Array = share(damping) * (effort - damping * drag)
+    return result
 
 
 def shortened(vector: Array, places: Array, longest: float) -> Array:

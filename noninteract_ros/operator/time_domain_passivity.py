@@ -4,13 +4,19 @@
 The device's end has the velocity given and answers with a force, the team's end has the force
 given and answers with a velocity. Each observes the energy at its port, tick by tick with the
 displacement that really happened, and gives away no more than the other end has announced
-(`energy_budget.py`): it takes the part along the given flow off its answer. What the team's end
-takes up is announced only as far as it was put in before. So the operator gets no more energy out
-than was put in and the reserve, whatever the team does. What the hand does within a tick, after
-the device's end has chosen its force, may overdraw that by a debt, which its next energy pays.
+(`energy_budget.py`). What the team's end takes up is announced only as far as it was put in
+before. So the operator gets no more energy out than was put in and the reserve, whatever the team
+does.
+
+The device's end has to choose its force before the hand moves. It answers with the nearest force
+that is paid for even if the displacement misses what the velocity foretells by as much as it ever
+did. Only a tick that misses by more can overdraw the budget, by its force times the growth of the
+greatest miss: over all time no more than the greatest force times the greatest miss of one tick,
+whatever hand, team and network do (`docs/derivations.md`).
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -18,8 +24,14 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.operator.energy_budget import Budget, Newest, Packet
 from noninteract_ros.operator.link_settings import LinkSettings
-from noninteract_ros.operator.port import Port, without_excess
+from noninteract_ros.operator.port import Port, affordable, without_excess
 from noninteract_ros.subtasks.layout import Layout
+
+Limiter = Callable[[Array], Array]
+
+
+def _unlimited(force: Array) -> Array:
+    return force
 
 
 class ObservedDevice:
@@ -29,23 +41,40 @@ class ObservedDevice:
         settings: The connection.
         metric: Damping of each coordinate in units of that of a plain one, shape (p,).
         period: Tick [s].
+        limited: What the device can do of a force; it shortens parts of it.
 
     Attributes:
         port: Energy exchanged with the hand.
         budget: What may be given to the hand.
+        doubt: By how much displacements have missed what was expected, at most [m]; rotations
+            count by the metric's root.
+        surprise: How far such misses can have overdrawn the budget since the start [J].
     """
 
-    def __init__(self, settings: LinkSettings, metric: Array, period: float) -> None:
-        self._metric, self._period = metric, period
+    def __init__(
+        self,
+        settings: LinkSettings,
+        metric: Array,
+        period: float,
+        limited: Limiter = _unlimited,
+    ) -> None:
+        self._metric, self._period, self._limited = metric, period, limited
         self._reserve, self._filling = settings.reserve, settings.filling
+        self._kept = settings.kept
         observed = settings.passivity != "none"
         self.budget = Budget(0.0 if observed else math.inf, settings.capacity)
         self.port = Port()
+        self.doubt = self.surprise = 0.0
         self._newest = Newest()
         self._feedback: Array = np.zeros_like(metric)
+        self._expected: Array = np.zeros_like(metric)
         self._team_level = settings.reserve
         self._announced = 0.0
         self._number = 0
+
+    def resume(self) -> None:
+        """Forgets the feedback, but no energy: the connection is taken up again."""
+        self._feedback = np.zeros_like(self._metric)
 
     def hear(self, packet: Packet) -> None:
         """Takes a packet of the team's end."""
@@ -55,26 +84,45 @@ class ObservedDevice:
 
     def force(self, velocity: Array) -> Array:
         """Force on the hand for the next tick [N; N m], for the velocity at its beginning."""
-        force = self._feedback
+        wanted = self._feedback
         if self._team_level < self._reserve:
-            force = force - self._filling * self._metric * velocity
-        limit = max(self.budget.level, 0.0) / self._period
-        return without_excess(force, velocity, self._metric, limit)
+            wanted = wanted - self._filling * self._metric * velocity
+        self._expected = self._period * velocity
+        limit = max(self.budget.level, 0.0)
+        force = affordable(self._limited(wanted), self._expected, self._metric, self.doubt, limit)
+        return self._shrunk(force)
 
     def moved(self, force: Array, way: Array, motion: Reference) -> Packet:
         """Observes what a force did over a displacement that led to a motion.
 
-        What the hand puts in makes good an overdrawn budget before it is announced.
+        Of what the hand puts in, the end keeps enough for its own swings before it announces any.
         """
+        self._compare(force, way)
         work = float(force @ way)
         self.port.give(work)
         if work > 0.0:
             self.budget.level -= work
         else:
-            self._announced += self.budget.repay(-work)
+            self._announced += self.budget.keep(-work, self._kept)
         self._number += 1
         signals = motion.position, motion.velocity
         return Packet(self._number, signals, self._announced, self.budget.level)
+
+    def _shrunk(self, force: Array) -> Array:
+        """What the device can do of a force, in its direction: cut in parts it might drive."""
+        able = self._limited(force)
+        if able is force:
+            return force
+        shares = able[force != 0.0] / force[force != 0.0]
+        return force * shares.min()
+
+    def _compare(self, force: Array, way: Array) -> None:
+        miss = way - self._expected
+        size = math.sqrt(float(miss @ (self._metric * miss)))
+        if size > self.doubt:
+            grip = math.sqrt(float(force @ (force / self._metric)))
+            self.surprise += grip * (size - self.doubt)
+            self.doubt = size
 
 
 class ObservedTeam:
@@ -109,6 +157,10 @@ class ObservedTeam:
         self._now, self._heard = start, (start.position, start.velocity)
         self._announced = 0.0
         self._number = 0
+
+    def resume(self, start: Reference) -> None:
+        """Starts from where the device is now, with the energy that there is."""
+        self._now, self._heard = start, (start.position, start.velocity)
 
     def hear(self, packet: Packet) -> None:
         """Takes a packet of the device's end."""

@@ -18,15 +18,18 @@ from noninteract_ros.operator.bilateral import LinkAccount
 KIND = "std_msgs/msg/Float64MultiArray"
 
 
-def recorded(folder: Path, budget: float, drawn: float = 0.5) -> Recorded:
-    """A run with a link and ten accounts."""
+def recorded(
+    folder: Path, budget: float, drawn: float = 0.5, debt_free: float = 0.309
+) -> Recorded:
+    """A run with a link and ten accounts, a surprise of 0.01 J and falling device budgets."""
     values = scenario_values(haptic__hand_mass=0.5)
     values["link"] = {"delay": 0.1, "reserve": 0.25}
     codec = EnergyCodec(("time", *LinkAccount._fields))
 
     def accounts(writer: RunWriter) -> None:
         for n in range(10):
-            account = np.array([0.1 * n, 2.0 * n, drawn * n, 1.5 * n, 0.1 * n, 0.3, budget, 4.0])
+            energies = [2.0 * n, drawn * n, 1.5 * n, 0.1 * n]
+            account = np.array([0.1 * n, *energies, debt_free - 0.001 * n, budget, 0.01, 4.0])
             stamp = 10**8 * n
             writer.add("/team/cooperative/link", KIND, stamp, stamp, codec.encode(account))
 
@@ -35,7 +38,7 @@ def recorded(folder: Path, budget: float, drawn: float = 0.5) -> Recorded:
 
 @pytest.mark.parametrize("budget", [0.7, np.inf])
 def test_the_figure_shows_ports_balance_and_budgets(tmp_path: Path, budget: float) -> None:
-    """Curves are what was published; the bound is the reserve; no budget is drawn without end."""
+    """Curves are what was published; no budget is drawn without end."""
     run = recorded(tmp_path, budget)
     account = link_account(run)
     assert account is not None
@@ -46,20 +49,30 @@ def test_the_figure_shows_ports_balance_and_budgets(tmp_path: Path, budget: floa
     np.testing.assert_allclose(curves["hand: in"], 2.0 * np.arange(10))
     np.testing.assert_allclose(curves["team: out"], 0.1 * np.arange(10))
     bound = {str(line.get_label()): line.get_ydata() for line in balance.lines}["bound"]
-    np.testing.assert_allclose(bound, -0.25)
+    np.testing.assert_allclose(bound, -0.26)
     assert np.isfinite(budgets.lines[1].get_ydata()).all() == np.isfinite(budget)
 
 
-@pytest.mark.parametrize(("drawn", "kept"), [(0.5, True), (2.02, True), (2.03, False)])
-def test_a_link_that_gives_more_than_its_reserve_fails_the_report(
+@pytest.mark.parametrize(("drawn", "kept"), [(0.5, True), (2.0288, True), (2.0290, False)])
+def test_a_link_that_gives_more_than_its_bound_fails_the_report(
     tmp_path: Path, drawn: float, kept: bool
 ) -> None:
-    """9 times (2 - drawn) J is the least balance; the reserve is 0.25 J."""
-    metrics, (check,) = link_metrics(recorded(tmp_path, 0.5, drawn))
+    """9 times (2 - drawn) J is the least balance; reserve and surprise are 0.26 J."""
+    metrics, (check, debt) = link_metrics(recorded(tmp_path, 0.5, drawn))
     assert check.passed is kept
+    assert debt.passed
     assert metrics["link"]["least_operator_net_J"] == pytest.approx(min(0.0, 9 * (2.0 - drawn)))
     assert metrics["link"]["lost"] == 4
     assert metrics["link"]["least_device_budget_J"] == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize(("first", "kept"), [(-0.0009, True), (-0.0011, False)])
+def test_a_device_that_owes_more_than_single_ticks_explain_fails_the_report(
+    tmp_path: Path, first: float, kept: bool
+) -> None:
+    """Its budget falls 9 mJ from the first account on; ticks explain 10 mJ."""
+    _, (_, debt) = link_metrics(recorded(tmp_path, 0.5, debt_free=first))
+    assert debt.passed is kept
 
 
 def test_it_is_drawn_where_there_is_a_link_and_only_there(tmp_path: Path) -> None:

@@ -86,19 +86,41 @@ def test_missed_samples_are_made_up_for() -> None:
     np.testing.assert_array_equal(made_up.position, reference.position)
 
 
-def test_after_a_dropout_and_a_reset_the_link_begins_anew() -> None:
-    """It is silent where the device is, and starts again from where the device is."""
+def test_after_a_dropout_the_link_starts_where_the_device_is_with_what_energy_is_left() -> None:
+    """Breaks bring no new reserve; a reset does, as a new run."""
     link = linked(link={"delay": 0.05}, dropout_times=[0.2, 0.5])
+    before = None
     for tick in range(700):
         reference = link.sample(tick / 1e3, np.array([5.0, 0.0]))
         assert (reference is None) == (200 <= tick < 500)
+        if tick == 199:
+            before = link.account
         if tick == 500:
             assert reference is link.device_motion
+            assert link.account == before
+    assert before is not None
+    assert before.operator_in > 0.0
     again = link.sample(0.0)
     assert again is link.device_motion
     account = link.account
     assert account is not None
     assert account.operator_in == account.operator_out == 0.0
+
+
+def test_breaks_one_after_the_other_do_not_empty_the_reserve_again_and_again() -> None:
+    """A hand that gives way to what pushes it gets the reserve out once; the account goes on."""
+    breaks = [edge for n in range(20) for edge in (0.1 + 0.2 * n, 0.12 + 0.2 * n)]
+    link = linked(link={"reserve": 0.01}, dropout_times=breaks, motion="still")
+    least = put_in = 0.0
+    for tick in range(4000):
+        along = link.device_motion.velocity if link.account else np.zeros(2)
+        link.sample(tick / 1e3, 20.0 * np.sign(along + 1e-3))
+        if account := link.account:
+            least = min(least, account.operator_net)
+            assert account.operator_in >= put_in
+            put_in = account.operator_in
+            assert account.operator_net >= -(0.01 + account.surprise) - 1e-9
+    assert least < 0.0
 
 
 def test_a_rigid_hand_feels_no_link() -> None:

@@ -37,13 +37,14 @@ def test_a_budget_forgoes_what_is_beyond_its_capacity() -> None:
     assert budget.level == pytest.approx(0.75)
 
 
-def test_debts_are_paid_before_anything_is_left() -> None:
-    """An overdrawn budget takes the energy first."""
+def test_debts_are_paid_and_some_is_kept_before_anything_is_left() -> None:
+    """An overdrawn budget takes the energy first, then what it is to keep."""
     budget = Budget(0.0, 1.0)
     budget.level = -0.3
-    assert budget.repay(0.2) == 0.0
-    assert budget.repay(0.2) == pytest.approx(0.1)
-    assert budget.level == pytest.approx(0.0)
+    assert budget.keep(0.2, 0.05) == 0.0
+    assert budget.keep(0.2, 0.05) == pytest.approx(0.05)
+    assert budget.level == pytest.approx(0.05)
+    assert budget.keep(0.2, 0.0) == 0.2
 
 
 def test_excess_is_taken_off_along_the_flow_and_nothing_else() -> None:
@@ -180,7 +181,7 @@ def test_an_overtaken_packet_brings_no_old_motion() -> None:
 
 def test_the_hand_fills_the_budget_of_the_team() -> None:
     """While the team's end has less than its reserve the device resists, and that is announced."""
-    settings = LinkSettings(reserve=0.2, filling=10.0)
+    settings = LinkSettings(reserve=0.2, filling=10.0, kept=0.001)
     device = ObservedDevice(settings, np.ones(1), PERIOD)
     velocity = np.array([0.5])
     assert device.force(velocity)[0] == 0.0
@@ -188,4 +189,5 @@ def test_the_hand_fills_the_budget_of_the_team() -> None:
     force = device.force(velocity)
     assert force[0] == pytest.approx(-5.0)
     packet = device.moved(force, PERIOD * velocity, Reference.still([0.0]))
-    assert packet.energy == pytest.approx(0.0025)
+    assert packet.energy == pytest.approx(0.0015)
+    assert packet.level == pytest.approx(0.001)
