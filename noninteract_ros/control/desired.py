@@ -7,6 +7,8 @@ shaped as rotation vectors from where they are to go, which leads along SO(3) wi
 derivatives; their angular velocity is never faster than the rotation vector changes.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from ruckig import ControlInterface, InputParameter, OutputParameter, Result, Ruckig, RuckigError
 
@@ -21,9 +23,8 @@ LONGEST = 1000.0  # [s] how far ahead a motion is planned
 class Shaper:
     """One step at a time towards a state, within limits; all numbers are plain.
 
-    An acceleration beyond the limits is cut off at once: to lead it back with bounded jerk would
-    carry the motion far away. Where no way to a set-point can be planned the motion slows down,
-    and where not even that can be, it rests.
+    An acceleration beyond the limit comes back with bounded jerk. Where no way to a set-point can
+    be planned the motion slows down, and where not even that can be, it rests.
 
     Args:
         limits: Bounds of velocity, acceleration and jerk, shape (3, p).
@@ -34,7 +35,7 @@ class Shaper:
         self._generator = Ruckig(dim, 1.0)
         self._input, self._output = InputParameter(dim), OutputParameter(dim)
         self._input.max_velocity, self._input.max_acceleration, self._input.max_jerk = limits
-        self._max_velocity, self._max_acceleration, _ = limits
+        self._max_velocity = limits[0]
 
     def towards(self, start: Reference, target: Target, step: float) -> tuple[Reference, bool]:
         """State `step` seconds on the way to a set-point, and whether it is reached."""
@@ -57,8 +58,7 @@ class Shaper:
         self._generator.delta_time = step
         self._input.current_position = start.position
         self._input.current_velocity = start.velocity
-        bound = self._max_acceleration
-        self._input.current_acceleration = np.clip(start.acceleration, -bound, bound)
+        self._input.current_acceleration = start.acceleration
         self._input.target_velocity = np.clip(speed, -self._max_velocity, self._max_velocity)
         try:
             result = self._generator.update(self._input, self._output)
@@ -74,6 +74,36 @@ class Shaper:
         return reached, result == Result.Finished
 
 
+class Inheritance:
+    """How much of an acceleration a motion goes on with after its source has left it.
+
+    To lead an acceleration a back by the jerk j takes the velocity on by a^2 / (2 j). Twice of
+    what a motion within the limits can have, as where two of them part, is led back in any case;
+    more only as far as the velocity stays within its limit. What is beyond is cut at once: the
+    limits of jerk and velocity contradict each other there, and the motion would go far astray.
+
+    Args:
+        limits: Bounds of velocity, acceleration and jerk, shape (3, p).
+    """
+
+    def __init__(self, limits: Array) -> None:
+        self._max_velocity, max_acceleration, self._max_jerk = limits
+        # From rest to full velocity no more is needed, however much is allowed.
+        needed = np.minimum(max_acceleration, np.sqrt(self._max_jerk * self._max_velocity))
+        self._twice = np.maximum(max_acceleration, 2.0 * needed)
+
+    def of(self, left: Reference, base: Reference | None = None) -> Reference:
+        """A motion with the acceleration that it goes on with, as seen from another one."""
+        velocity, acceleration = left.velocity, left.acceleration
+        if base is not None:
+            velocity, acceleration = velocity - base.velocity, acceleration - base.acceleration
+        ahead = self._max_velocity - np.sign(acceleration) * velocity
+        room = np.clip(ahead, 0.0, 2.0 * self._max_velocity)
+        bound = np.maximum(self._twice, np.sqrt(2.0 * self._max_jerk * room))
+        beyond = acceleration - np.clip(acceleration, -bound, bound)
+        return replace(left, acceleration=left.acceleration - beyond) if beyond.any() else left
+
+
 class DesiredMotion:
     """What a subtask is to do now.
 
@@ -87,7 +117,7 @@ class DesiredMotion:
     def __init__(self, limits: Array, direct: bool, layout: Layout | None = None) -> None:
         layout = layout or Layout.numbers(limits.shape[1])
         self._limits, self._direct, self._layout = limits, direct, layout
-        self._shaper = Shaper(limits)
+        self._shaper, self._inheritance = Shaper(limits), Inheritance(limits)
         self._zero = Target(np.zeros(layout.dim), np.zeros(layout.dim))
         self.rest_at(layout.identity)
 
@@ -115,6 +145,8 @@ class DesiredMotion:
             self._now = self._follow(motion, step)
             self._followed = motion
             return self._now
+        if self._followed is not None:
+            self._now = self._inheritance.of(self._now)
         self._followed = self._gap = None
         if step > 0.0:
             self._now = self._shape(motion, step)
@@ -164,7 +196,8 @@ class DesiredMotion:
         if self._direct:
             return motion
         if self._jumps(motion, step):
-            self._gap = self._now.minus(motion.at(-step, self._layout), self._layout)
+            before = motion.at(-step, self._layout)
+            self._gap = self._inheritance.of(self._now, before).minus(before, self._layout)
         if self._gap is not None and step > 0.0:
             self._gap, closed = self._shaper.towards(self._gap, self._zero, step)
             if closed:

@@ -65,7 +65,9 @@ def rest_time(ticks: list[Tick]) -> float:
 
 def way(before: Tick, ticks: list[Tick], part: slice) -> float:
     """How far a subtask went from where it was at `before` [m]."""
-    return float(np.linalg.norm([t.task.x[part] - before.task.x[part] for t in ticks], axis=1).max())
+    return float(
+        np.linalg.norm([t.task.x[part] - before.task.x[part] for t in ticks], axis=1).max()
+    )
 
 
 def torque_rates(before: Tick, ticks: list[Tick]) -> np.ndarray:
