@@ -126,7 +126,7 @@ class BilateralLink:
             InputError: The feedback has another shape or is not finite.
         """
         index = round(t * self._rate)
-        force = self._device.checked(feedback)
+        force = self._settings.force_scale * self._device.checked(feedback)
         before = self._index
         if before is None or not 0 <= index - before <= LONGEST_GAP * self._rate:
             return self._begin(index)

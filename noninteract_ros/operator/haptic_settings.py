@@ -58,7 +58,7 @@ class HapticSettings:
     hand_damping: float = key("Damping of the hand's grip [N s/m]", 20.0, minimum=0.0)
     hand_stiffness: float = key("Stiffness of the hand's grip [N/m]", 300.0, minimum=0.0)
     hand_inertia: float = key(
-        "Inertia of a turning hand with a mass [kg m^2]", 0.01, positive=True
+        "Inertia of a turning hand, with the device in it [kg m^2]", 0.01, positive=True
     )
     hand_turning_damping: float = key(
         "Damping of the grip against turning [N m s/rad]", 0.2, minimum=0.0
@@ -67,9 +67,11 @@ class HapticSettings:
         "Stiffness of the grip against turning [N m/rad]", 3.0, minimum=0.0
     )
     device_mass: float = key(
-        "Mass of the device, which the hand has to move along [kg]", 0.0, minimum=0.0
+        "Mass of the device in translation, which the hand has to move along [kg]",
+        0.0,
+        minimum=0.0,
     )
-    device_damping: float = key("Damping of the device [N s/m]", 0.0, minimum=0.0)
+    device_damping: float = key("Damping of the device in translation [N s/m]", 0.0, minimum=0.0)
     force_limit: float = key("Most force of the device [N]; 0: any", 0.0, minimum=0.0)
     torque_limit: float = key("Most torque of the device [N m]; 0: any", 0.0, minimum=0.0)
     workspace: tuple[float, ...] = key(
@@ -78,7 +80,7 @@ class HapticSettings:
     workspace_centre: tuple[float, ...] = key("Its centre [m]; by default the origin", ())
     workspace_stiffness: float = key("Stiffness of its ends [N/m]", 2000.0, positive=True)
     reaction_stiffness: float = key(
-        "How the operator makes good a deviation on noticing it [N/m]", 0.0, minimum=0.0
+        "How the operator makes good a deviation in place on noticing it [N/m]", 0.0, minimum=0.0
     )
     reaction_delay: float = key("How late the operator notices [s]", 0.2, minimum=0.0)
     dropout_times: tuple[float, ...] = key(

@@ -13,6 +13,8 @@ from noninteract_ros.operator.haptic_settings import HapticSettings
 from noninteract_ros.schema import join
 from noninteract_ros.subtasks.layout import Layout
 
+TRANSLATIONAL = ("device_mass", "device_damping", "reaction_stiffness")
+
 
 class Offset(Protocol):
     """A hand, of which the deviation of the plain coordinates is known."""
@@ -55,7 +57,8 @@ class HeldDevice:
         """The device of a scenario; None where nothing but its motors acts on the hand.
 
         Raises:
-            ScenarioError: The workspace has another size than the subtask.
+            ScenarioError: The workspace has another size than the subtask, or a key for
+                translations is given where there are none.
         """
         count = layout.rates.size
         for name in ("workspace", "workspace_centre"):
@@ -64,8 +67,11 @@ class HeldDevice:
                 raise ScenarioError(
                     join(path, name), list(found), f"{count} numbers, one a coordinate"
                 )
-        own = settings.device_mass, settings.device_damping, settings.reaction_stiffness
-        if not (any(own) or settings.workspace):
+        own = [name for name in TRANSLATIONAL if getattr(settings, name)]
+        if own and not count:
+            found = getattr(settings, own[0])
+            raise ScenarioError(join(path, own[0]), found, "0 for a subtask that only turns")
+        if not (own or settings.workspace):
             return None
         centre = np.array(settings.workspace_centre or (0.0,) * count)
         return cls(settings, centre, (layout.rates, layout.values))

@@ -25,6 +25,12 @@ class LinkSettings:
         "tdpa",
         choices=("none", "tdpa"),
     )
+    force_scale: float = key(
+        "Share of the team's force that the hand is to feel; the link's energies are those of"
+        " this share",
+        1.0,
+        positive=True,
+    )
     bandwidth: float = key(
         "Bandwidth with which the team's end smooths what arrives [rad/s]", 60.0, positive=True
     )

@@ -28,6 +28,7 @@ Motion = tuple[Array, Array, Array]
 """Value (size,) or gap (dim,), with its velocity (dim,) and acceleration (dim,)."""
 
 UNIT_TOLERANCE = 1e-3
+UNIT_ROUNDING = 1e-14
 
 
 class Layout:
@@ -101,6 +102,8 @@ class Layout:
     def checked(self, values: Array) -> Array:
         """Values with their quaternions at unit length, shape (..., size).
 
+        Those that are so but for rounding stay to the bit: who receives a value has the sender's.
+
         Raises:
             InputError: A quaternion is not a unit one.
         """
@@ -112,6 +115,7 @@ class Layout:
         if wrong.any():
             raise InputError(f"a quaternion has length {lengths[wrong][0]:.3g}, should be 1")
         result = values.copy()
+        lengths = np.where(np.abs(lengths - 1.0) < UNIT_ROUNDING, 1.0, lengths)
         result[..., self.quaternions] = q / lengths[..., None]
         return result
 

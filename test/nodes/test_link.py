@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A device behind a link on the stack: the run is the rehearsal, and its account is published."""
+"""A device behind a link on the stack: the run is the rehearsal, and its account is told."""
 
 from typing import Any
 
 import numpy as np
 from harness import Ros, merged, until
+from pose_link import pose_link
 from repository import ROOT
 from std_msgs.msg import Float64MultiArray
 
@@ -23,8 +24,8 @@ def values(**changes: Any) -> dict[str, Any]:
     return merged(merged(found, early), changes)
 
 
-def test_over_a_link_too_every_run_is_the_rehearsal_and_the_account_is_told(ros: Ros) -> None:
-    """States agree to the bit; the account is labelled, at the telemetry rate, and the same."""
+def runs_as_rehearsed(ros: Ros, found: dict[str, Any], end: float) -> dict[float, list[float]]:
+    """States agree to the bit, accounts are labelled, at the telemetry rate, and the same."""
     told: dict[float, list[float]] = {}
     labels: list[list[str]] = []
 
@@ -33,7 +34,7 @@ def test_over_a_link_too_every_run_is_the_rehearsal_and_the_account_is_told(ros:
         told[message.data[0]] = list(message.data[1:])
 
     ros.probe.create_subscription(Float64MultiArray, "cooperative/link", note, 1000)
-    stack = ros.stack(values())
+    stack = ros.stack(found)
     ros.matched(stack.nodes["haptic_emulator"]._account_to)
     stack.begin()
     until(stack.ear.says("robot_team", "finished"), "the end of the run")
@@ -41,17 +42,37 @@ def test_over_a_link_too_every_run_is_the_rehearsal_and_the_account_is_told(ros:
     assert rehearsal.link is not None
     expected: dict[float, list[float]] = {}
     _, q, _, _ = stack.ear.history(stack.ear.states)
-    for tick in range(round(1000 * END)):
+    for tick in range(round(1000 * end)):
         np.testing.assert_array_equal(q[tick], rehearsal.q)
         rehearsal.step()
-        assert rehearsal.link.account is not None
-        expected[tick / 1000] = list(rehearsal.link.account)
-    until(lambda: len(told) >= 250 * END, "the accounts")
+        if account := rehearsal.link.account:
+            expected[tick / 1000] = list(account)
+    count = round(250 * (end - min(expected)))
+    until(lambda: len(told) >= count, "the accounts")
     assert labels[0] == ["time", *LinkAccount._fields]
-    assert sorted(told)[:100] == [tick / 250 for tick in range(100)]
-    for now in sorted(told)[:100]:
+    begin = round(250 * min(expected))
+    assert sorted(told)[:count] == [tick / 250 for tick in range(begin, begin + count)]
+    for now in sorted(told)[:count]:
         assert told[now] == expected[now], now
-    assert expected[END - 0.001][0] > 0.0
+    return told
+
+
+def test_over_a_link_too_every_run_is_the_rehearsal_and_the_account_is_told(ros: Ros) -> None:
+    """At the wall."""
+    told = runs_as_rehearsed(ros, values(), END)
+    assert max(account[0] for account in told.values()) > 0.0
+
+
+def test_arms_that_are_led_in_six_degrees_of_freedom_give_nothing_away(ros: Ros) -> None:
+    """Two Pandas with a box, over DDS in lockstep: the account of a run that moves and turns."""
+    end = 0.6
+    told = runs_as_rehearsed(ros, pose_link(delay=0.03) | {"end_time": end}, end)
+    accounts = [LinkAccount(*account) for account in told.values()]
+    for account in accounts:
+        assert account.operator_net >= -(0.1 + account.surprise) - 1e-9
+        assert account.device_budget >= -account.surprise - 1e-9
+    assert accounts[-1].operator_in > 0.01
+    assert accounts[-1].team_in > 0.0
 
 
 def test_the_account_is_among_the_diagnostics(ros: Ros) -> None:

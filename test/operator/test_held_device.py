@@ -104,3 +104,11 @@ def test_a_workspace_of_another_size_is_refused() -> None:
     """The error names the key and how many numbers it takes."""
     with pytest.raises(ScenarioError, match=r"haptic\.workspace: found \[1\.0\].*2 numbers"):
         device(**STILL, workspace=[1.0])
+
+
+def test_what_concerns_translations_is_refused_where_there_are_none() -> None:
+    """A mass of the device says nothing about turning; its key is named."""
+    turn = Layout((0,), (True,))
+    values = {**GRIP, "motion": "still", "centre": [], "device_mass": 0.2}
+    with pytest.raises(ScenarioError, match=r"haptic\.device_mass: found 0\.2.* only turns"):
+        HapticDevice(load(HapticSettings, values, "haptic"), turn)

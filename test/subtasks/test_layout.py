@@ -143,3 +143,11 @@ def test_quaternions_are_checked_and_brought_to_unit_length():
     np.testing.assert_array_equal(found, [7.0, 0.0, 0.0, 0.0, 1.0])
     with pytest.raises(InputError, match="length 0, should be 1"):
         layout.checked(np.zeros((2, 5)))
+
+
+def test_unit_quaternions_pass_a_check_to_the_bit():
+    """Otherwise a message would not carry what was sent."""
+    layout = Layout((0,), (True,))
+    for phi in np.random.default_rng(2).normal(size=(200, 3)):
+        q = layout.sum(layout.identity, phi)
+        np.testing.assert_array_equal(layout.checked(q), q)
