@@ -37,7 +37,7 @@ class InputSettings:
         choices=("shaped", "direct"),
     )
     hand_over_times: tuple[float, ...] = key(
-        "When the subtask is handed over, in the team's time [s]", (), minimum=0.0
+        "When the subtask is handed over, since the team's first state [s]", (), minimum=0.0
     )
     hand_over_to: tuple[str, ...] = key(
         "Who takes it at each of these times", (), choices=AUTHORITIES

@@ -58,13 +58,19 @@ class Chronicle:
         self._silent = silent
 
     def status(
-        self, now: float, age: float | None, waiting: Sequence[str], absent: Iterable[str]
+        self,
+        now: float,
+        age: float | None,
+        standing: str,
+        waiting: Sequence[str],
+        absent: Iterable[str],
     ) -> tuple[Level, str, dict[str, object]]:
         """Level, sentence and values for /diagnostics.
 
         Args:
             now: The team's time [s].
             age: Age of its newest state in wall time [s]; None before the first one.
+            standing: Why the team's time stands on purpose, or an empty text.
             waiting: What the tick has been waiting for so long that it is worth a word; before
                 the first state, robots that have not spoken.
             absent: Lockstep sources that were given up.
@@ -73,7 +79,7 @@ class Chronicle:
         if age is None:
             whom = ", ".join(waiting) or "the team"
             return Level.WARN, f"waiting for the first state of {whom}", values
-        if age > self._age_limit:
+        if age > self._age_limit and not standing:
             return Level.ERROR, "holding: no states of the team", values
         if self.problem:
             return Level.ERROR, f"holding: {self.problem}", values
@@ -81,6 +87,8 @@ class Chronicle:
             return Level.ERROR, problem, values
         if self._core.mode.stopped:
             return Level.WARN, "stopped", values
+        if standing:
+            return Level.WARN, f"waiting: {standing}", values
         if waiting:
             return Level.WARN, f"waiting for {', '.join(waiting)}", values
         if absent:

@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from rcl_interfaces.msg import ParameterEvent
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_parameter_events
 from rclpy.task import Future
 from std_srvs.srv import SetBool, Trigger
 
@@ -58,6 +60,10 @@ class Calls:
         self._set = node.create_client(
             SetParametersAtomically, "controller/set_parameters_atomically"
         )
+        self._controller = node.resolve_topic_name("controller")
+        node.create_subscription(
+            ParameterEvent, "/parameter_events", self._on_event, qos_profile_parameter_events
+        )
         keys = ("authority", "stiffness", "damping")
         self._names = ["law", *(f"{task}.{key}" for task in subtasks for key in keys)]
         self._pending: list[Pending] = []
@@ -102,6 +108,11 @@ class Calls:
                 ok, text = item.taken(item.future.result()) if done else (False, "no answer")
                 item.answer(ok, f"{item.what}: {text}")
                 self._read_at = 0.0
+
+    def _on_event(self, event: ParameterEvent) -> None:
+        """Somebody has changed something: it is read anew at once."""
+        if event.node == self._controller:
+            self._read_at = 0.0
 
     def read(self, period: float) -> None:
         """Asks for the parameters again and again, each period [s]."""

@@ -24,10 +24,11 @@ from noninteract_ros.nodes.messages import Level, SubtaskCodec
 from noninteract_ros.nodes.node import ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 from noninteract_ros.nodes.source_topics import listen
+from noninteract_ros.nodes.standing import Standing
 from noninteract_ros.nodes.team_link import TeamLink
 from noninteract_ros.nodes.telemetry import Telemetry
 
-WATCH_PERIOD = 0.1  # [s] how often absent lockstep sources are looked for
+WATCH_PERIOD = 0.1  # [s] how often absent lockstep sources and planned hand-overs are looked for
 BRAKE_TIME = 2.0  # [s] given to effort-controlled robots to come to rest when the program ends
 AT_REST = 1e-3  # [m/s or rad/s]
 WAIT_SHOWN = 0.3  # [s] of waiting for something that is worth a word
@@ -62,6 +63,7 @@ class Controller(ScenarioNode):
         self._chronicle = Chronicle(self, self.core, self._telemetry)
         self._live = LiveParameters(self, self.core, self._post, self._chronicle.changed)
         self._authority = AuthorityTopics(self, stack.names)
+        self._standing = Standing(self)
         self._watch = SourceWatch(
             general.lockstep_sources if self.lockstep else (),
             self.core.inputs,
@@ -77,6 +79,7 @@ class Controller(ScenarioNode):
         self.create_service(Trigger, "~/refill", self._on_refill)
         if self.lockstep:
             self.every(WATCH_PERIOD, self._answer_if_complete)
+        self.every(WATCH_PERIOD, self._tell_who_leads)
 
     def _take_input(
         self, topic: str, subtask: str, source: str, parsed: tuple[int, Motion | Force | None]
@@ -89,6 +92,11 @@ class Controller(ScenarioNode):
         if self.lockstep:
             self._work_off()
             self._answer_if_complete()
+
+    def _tell_who_leads(self) -> None:
+        """Has the parameters follow hand-overs by plan, once all that was asked for is done."""
+        if not self._queue:
+            self._live.follow_authority()
 
     def _work_off(self) -> None:
         while self._queue:
@@ -257,7 +265,8 @@ class Controller(ScenarioNode):
         else:
             age = now - self._state_at
             waiting = self._missing if now - self._waiting_since > WAIT_SHOWN else []
-        return self._chronicle.status(self._now, age, waiting, self._watch.absent)
+        standing = self._standing.reason
+        return self._chronicle.status(self._now, age, standing, waiting, self._watch.absent)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -33,7 +33,9 @@ class LiveParameters:
         post: Callable[[Callable[[], None]], None],
         changed: set[str],
     ) -> None:
-        self._core, self._post, self._changed = core, post, changed
+        self._node, self._core, self._post, self._changed = node, core, post, changed
+        self._authorities = {name: item.authority for name, item in core.inputs.items()}
+        self._following = False
         self._rules = {
             name: (hint, rule) for name, hint, rule, _ in node.scenario.parameters() if rule.live
         }
@@ -43,6 +45,8 @@ class LiveParameters:
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
         """Takes all changes or none; the reason names what is allowed."""
+        if self._following:
+            return SetParametersResult(successful=True)
         impedances, tank = dict(self._impedances), self._tank
         changes: list[Callable[[], None]] = []
         try:
@@ -60,6 +64,10 @@ class LiveParameters:
         except ScenarioError as error:
             return SetParametersResult(successful=False, reason=str(error))
         self._changed |= {item.name for item in parameters} & self._rules.keys()
+        for parameter in parameters:
+            subtask, _, item = parameter.name.rpartition(".")
+            if item == "authority" and subtask in self._authorities:
+                self._authorities[subtask] = parameter.value
         for name, settings in impedances.items():
             if settings != self._impedances[name]:
                 changes.append(partial(self._core.set_impedance, name, settings))
@@ -68,6 +76,19 @@ class LiveParameters:
         self._impedances, self._tank = impedances, tank
         self._post(partial(_run_all, changes))
         return SetParametersResult(successful=True)
+
+    def follow_authority(self) -> None:
+        """Has the parameters tell who leads, where it is not who was last asked for."""
+        for name, item in self._core.inputs.items():
+            leads = item.authority
+            if self._authorities[name] == leads:
+                continue
+            self._authorities[name] = leads
+            self._following = True
+            try:
+                self._node.set_parameters([Parameter(f"{name}.authority", value=leads)])
+            finally:
+                self._following = False
 
     def _plan(
         self,

@@ -34,13 +34,17 @@ def torque_rates(ticks: list[Tick]) -> np.ndarray:
 
 
 def test_a_plan_hands_over_once_at_each_of_its_times() -> None:
-    """In between others may be asked for; after a reset the plan starts over."""
+    """In between others may be asked for; after a reset the plan starts over.
+
+    Times count from the first state, as in wall time the clock began decades before.
+    """
     plan = HandOvers([1.0, 2.0], ["human", "hold"], "relative")
     assert [plan.due(t) for t in (0.0, 0.999, 1.0, 1.5)] == [None, None, "human", None]
     assert plan.due(7.0) == "hold"
     assert plan.due(8.0) is None
     plan.reset()
-    assert plan.due(1.0) == "human"
+    found = [plan.due(1.8e9 + t) for t in (0.0, 0.9, 1.0, 1.5, 2.0)]
+    assert found == [None, None, "human", None, "hold"]
 
 
 @pytest.mark.parametrize(
