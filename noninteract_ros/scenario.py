@@ -209,7 +209,7 @@ class Scenario:
             [spec.impedance for spec in self.subtasks.values()],
             [spec.input for spec in self.subtasks.values()],
             self.general.transition_time,
-            min(self.general.stop_rate, 0.25 * self.general.rate),
+            min(self.general.stop_rate, 0.125 * self.general.rate),
             self.general.state_timeout,
             self.safety,
             self.tank,

@@ -70,9 +70,9 @@ class General:
     push_timeout: float = key("How long a push lasts unless repeated [s]", 0.1, positive=True)
     transition_time: float = key("Fade of a change of law or gains [s]", 0.2, positive=True)
     stop_rate: float = key(
-        "Decay rate of the velocity after a stop, in full force 4 / stop_rate after it; at most a"
-        " quarter of the rate [1/s]",
-        50.0,
+        "Decay rate of the velocity after a stop, in full force 4 / stop_rate after it; of slow"
+        " motions up to twice as much; at most an eighth of the rate [1/s]",
+        30.0,
         positive=True,
     )
     pushes: tuple[str, ...] = key("Names of pushes; each has a block of that name", ())

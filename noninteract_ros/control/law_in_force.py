@@ -22,18 +22,18 @@ class LawInForce:
         gate: The energy account with its gates.
         goals: Forces that subtasks are to press with.
         transition_time: How long a change fades in [s].
-        stop_rate: Decay rate of the velocity after a stop [1/s].
+        stop: What brings a stopped team to rest.
 
     Attributes:
         left: Mode that a change has left since the last tick, or None.
     """
 
     def __init__(
-        self, gate: EnergyGate, goals: ForceGoals, transition_time: float, stop_rate: float
+        self, gate: EnergyGate, goals: ForceGoals, transition_time: float, stop: Stop
     ) -> None:
         self._gate, self._goals = gate, goals
         self._transition_time = transition_time
-        self._fade, self._stop = Fade(), Stop(stop_rate)
+        self._fade, self._stop = Fade(), stop
         self.left: Mode | None = None
 
     def forget(self) -> None:
@@ -62,7 +62,7 @@ class LawInForce:
         """
         dynamics, v = seen.dynamics, seen.state.v
         if mode.stopped and self.left is not None and not self.left.stopped:
-            self._stop.begin(moment.now)
+            self._stop.begin(moment.now, dynamics.velocity(v))
         if share == 0.0:  # The law is not even defined at a singularity; what fades starts over.
             self.left = None
             self._fade.forget()

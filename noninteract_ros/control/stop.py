@@ -3,7 +3,11 @@
 
 import numpy as np
 
+from noninteract_ros.arrays import Array
+
 RAMP = 4.0  # Length of the ramp in units of 1 / rate: exp(-2) of the velocity is left after it.
+JERKS = 4.0  # Jerk of a stop in units of the references': no later at rest than after a release.
+RANGE = 2.0  # How many times as fast the slowest motions are stopped as the fastest ones.
 
 
 class Stop:
@@ -13,22 +17,41 @@ class Stop:
     0.3 rate v0, and exponentially from there on: after 7.3 / rate it is a two-hundredth. Whatever
     d >= 0 does, M v_dot = -d M v takes energy out of the team and never puts any in.
 
+    The jerk is greatest at first, rate^2 v0 / RAMP. With JERKS times the jerk j that references
+    may have, rate = 4 sqrt(j / v0), it is at rest after 1.8 sqrt(v0 / j), sooner than a reference
+    that is let go, which takes 2 sqrt(v0 / j).
+
     Args:
-        rate: Decay rate once the damping is in full force [1/s].
+        rate: Decay rate of fast motions once the damping is in full force [1/s].
+        max_jerk: Bounds of the references of all subtasks, shape (n,) [m/s^3; rad/s^3].
     """
 
-    def __init__(self, rate: float) -> None:
+    def __init__(self, rate: float, max_jerk: Array) -> None:
+        self._slowest, self._max_jerk = rate, max_jerk
         self._rate = rate
-        self.ramp_time = RAMP / rate
         self.forget()
+
+    @property
+    def ramp_time(self) -> float:
+        """How long the damping of this stop rises [s]."""
+        return RAMP / self._rate
 
     def forget(self) -> None:
         """A stop of before: its damping is in full force."""
         self._began = -np.inf
 
-    def begin(self, now: float) -> None:
-        """A stop begins at a time [s]."""
+    def begin(self, now: float, velocity: Array) -> None:
+        """A stop begins at a time [s].
+
+        Args:
+            now: The time [s].
+            velocity: Of the subtasks, shape (n,) [m/s; rad/s].
+        """
         self._began = now
+        swiftness = float(np.max(np.abs(velocity) / self._max_jerk))
+        quickest = RANGE * self._slowest
+        fitting = np.sqrt(RAMP * JERKS / swiftness) if swiftness > 0.0 else quickest
+        self._rate = float(np.clip(fitting, self._slowest, quickest))
 
     def damping(self, now: float) -> float:
         """d [1/s] at a time [s]."""

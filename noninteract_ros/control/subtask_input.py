@@ -80,6 +80,7 @@ class SubtaskInput:
     Attributes:
         authority: Source in force; may be changed at any time.
         sources: Inputs by source.
+        max_jerk: Bound of shaped motions, shape (p,) [m/s^3; rad/s^3].
     """
 
     def __init__(self, subtask: Subtask, settings: InputSettings) -> None:
@@ -90,6 +91,7 @@ class SubtaskInput:
         self._timeout = settings.timeout
         names = ("max_velocity", "max_acceleration", "max_jerk")
         limits = np.array([spread(subtask, name, getattr(settings, name)) for name in names])
+        self.max_jerk: Array = limits[2]
         self._layout = CompiledLayout(subtask.layout)
         self._desired = DesiredMotion(limits, settings.takeover == "direct", self._layout)
         self._max_force = spread(subtask, "max_wrench", settings.max_wrench)

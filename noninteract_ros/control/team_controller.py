@@ -22,6 +22,7 @@ from noninteract_ros.control.law_in_force import LawInForce
 from noninteract_ros.control.outside import Outside
 from noninteract_ros.control.safety_settings import SafetySettings
 from noninteract_ros.control.singularity import SingularityGuard, best_regularity
+from noninteract_ros.control.stop import Stop
 from noninteract_ros.control.subtask_input import InputSettings, Led, SubtaskInput
 from noninteract_ros.control.team_view import Seen, TeamView, view_of
 from noninteract_ros.control.tick import Mode, Tick
@@ -43,7 +44,7 @@ class TeamController:
         impedances: Gains, by subtask in the stack's order.
         inputs: Authority, timeouts and limits, in the same order.
         transition_time: How long a change of law or gains fades in [s].
-        stop_rate: Decay rate of the velocity after a stop, once it is in full force [1/s].
+        stop_rate: Decay rate of fast motions after a stop, once it is in full force [1/s].
         state_timeout: Gap between states after which every subtask starts anew [s].
         safety: Behaviour at singularities and joint limits.
         tank: Capacity, levels and rates of the energy account.
@@ -59,7 +60,7 @@ class TeamController:
         impedances: Sequence[ImpedanceSettings],
         inputs: Sequence[InputSettings],
         transition_time: float = 0.2,
-        stop_rate: float = 50.0,
+        stop_rate: float = 30.0,
         state_timeout: float = 0.2,
         safety: SafetySettings = DEFAULT_SAFETY,
         tank: TankSettings = DEFAULT_TANK,
@@ -77,7 +78,9 @@ class TeamController:
         self.gate = EnergyGate(team, stack, tank)
         self.outside = Outside(team, measured, tank.observer_gain)
         self._springs, self._goals = WaitingSprings(transition_time), ForceGoals(team.n)
-        self._law = LawInForce(self.gate, self._goals, transition_time, stop_rate)
+        max_jerk = np.concatenate([item.max_jerk for item in self.inputs.values()])
+        stop = Stop(stop_rate, max_jerk)
+        self._law = LawInForce(self.gate, self._goals, transition_time, stop)
         best = best_regularity(team, stack)
         scout = WayOut(team, stack, best, safety.singularity_begin)
         self._guard = SingularityGuard(team, safety, best, scout)
