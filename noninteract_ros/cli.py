@@ -18,7 +18,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from noninteract_ros import __version__
-from noninteract_ros.errors import NoninteractError, ScenarioError, one_of
+from noninteract_ros.errors import NoninteractError, RecordingError, ScenarioError, one_of
 
 app = typer.Typer(
     help="Robot teams led by a human: demos, reports, checks and measurements.",
@@ -37,7 +37,7 @@ def main() -> int:
         return 2
     except NoninteractError as error:
         print(f"noninteract: {error}", file=sys.stderr)
-        return 1
+        return 2 if isinstance(error, RecordingError) else 1
     except typer.Exit as end:
         return end.exit_code
     except (typer.Abort, KeyboardInterrupt):

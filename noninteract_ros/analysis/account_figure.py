@@ -27,7 +27,9 @@ def account_figure(recorded: Recorded) -> Figure:
     _draw(energies, found.t, ("reserve $R$", found.reserve), first=2)
     _draw(powers, found.t, ("supplied", found.supplied), ("dissipated", found.dissipated))
     _draw(powers, found.t, ("wanted by decoupling $P$", found.demand), first=2)
-    _draw(gates, found.t, ("$\\sigma$", found.sigma), ("$\\nu$", found.grip))
+    # Under a law without gates there is nothing to show.
+    sigma, grip = (np.where(found.gated, gate, np.nan) for gate in (found.sigma, found.grip))
+    _draw(gates, found.t, ("$\\sigma$", sigma), ("$\\nu$", grip))
     gates.lines[1].set_linestyle((0, (4, 3)))  # They often lie on each other.
     gates.set_ylim(-ROOM, 1.0 + ROOM)
     _draw(sums, found.t, ("received", _whole(found)), ("residual", found.residual))

@@ -202,10 +202,11 @@ def closed_form(recorded: Recorded, subtask: str, outside: list[Influence]) -> C
 def closed_form_check(recorded: Recorded, subtask: str, found: ClosedForm | str) -> Check:
     """Largest deviation against the bound, or why there is none."""
     name, limit = f"closed_form.{subtask}", LIMIT * 1000.0 / recorded.rate
+    unit = ", ".join(sorted(set(recorded.task(subtask).units)))
     if isinstance(found, str):
-        return not_applicable(name, limit, "m", found)
+        return not_applicable(name, limit, unit, found)
     limit *= max(1.0, found.largest_error)
-    return at_most(name, float(np.abs(found.deviation).max()), limit, "m")
+    return at_most(name, float(np.abs(found.deviation).max()), limit, unit)
 
 
 def _require(recorded: Recorded, subtask: str, outside: list[Influence]) -> None:

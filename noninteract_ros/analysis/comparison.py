@@ -31,7 +31,7 @@ from noninteract_ros.arrays import Array
 # [m; rad] How far a source may move a subtask that is not its own. On inertias that vary with
 # where the team is, holding the torque over a tick moves it by `holding.deflection` more.
 MOVED = 1e-9
-SAME = 1e-12  # [m, m/s] the same arithmetic on another processor may round differently
+SAME = 1e-12  # [m, m/s; rad, rad/s] the same arithmetic on another processor may round differently
 # (29) keeps a subtask on its reference whatever others do; how it comes back is another thing.
 OFF = "a subtask is off its reference, and its inertia depends on where the others are"
 DECOUPLING_LAWS = ("energy_gated", "noninteracting", "paper")
@@ -110,8 +110,10 @@ class Comparer:
         """The nodes add nothing: the recorded joint states are those of a rehearsal."""
         name, recorded = "reproduction", self._recorded
         reason = self._incomparable("*")
+        units = sorted(set(recorded.team.units))
+        unit = ", ".join([*units, *(f"{unit}/s" for unit in units)])
         if reason:
-            return {"reason": reason}, not_applicable(name, SAME, "m, m/s", reason)
+            return {"reason": reason}, not_applicable(name, SAME, unit, reason)
         joints = self._results[Variant(self._law)]
         rows = recorded.ticks < len(joints.q)
         ticks = recorded.ticks[rows]
@@ -119,11 +121,12 @@ class Comparer:
         largest = max(_largest(q), _largest(v))
         metrics = {
             "compared_s": float(recorded.t[rows][-1]),
-            "max_position_difference_m": _largest(q),
-            "max_velocity_difference_m_per_s": _largest(v),
+            "max_position_difference": _largest(q),
+            "max_velocity_difference": _largest(v),
+            "unit": unit,
             "bit_equal": largest == 0.0,
         }
-        return metrics, at_most(name, largest, SAME, "m, m/s")
+        return metrics, at_most(name, largest, SAME, unit)
 
     def _noninteraction(self) -> tuple[dict[str, Any], list[Check]]:
         """Each source moves no subtask but its own."""
@@ -140,14 +143,16 @@ class Comparer:
             metrics[f"without_{source}"] = {
                 "reason": reason or None,
                 "compared_s": seconds,
-                "moved_m": None if reason else self._by_subtask(moved),
-                "allowed_m": None if reason else self._by_subtask(limits),
+                "moved": None if reason else self._by_subtask(moved),
+                "allowed": None if reason else self._by_subtask(limits),
             }
-            name, unit = f"noninteraction.{source}", self._unit
+            name = f"noninteraction.{source}"
             if reason:
-                checks.append(not_applicable(name, MOVED, unit, reason))
+                units = sorted(set(np.array(self._units)[others].tolist()))
+                checks.append(not_applicable(name, MOVED, ", ".join(units), reason))
                 continue
             worst = int(np.argmax(np.where(others, moved / limits, -1.0)))
+            unit = self._units[worst]
             checks.append(at_most(name, moved[worst], float(limits[worst]), unit))
         return metrics, checks
 
@@ -168,8 +173,9 @@ class Comparer:
         return "", self._moved_by(without), MOVED + difference
 
     @property
-    def _unit(self) -> str:
-        return "m, rad" if self._recorded.stack.layout.rotates else "m"
+    def _units(self) -> tuple[str, ...]:
+        """Unit of each coordinate of all subtasks, shape (n,)."""
+        return tuple(unit for task in self._recorded.stack.subtasks for unit in task.units)
 
     def _carried_over(self, without: Joints) -> str:
         """Why subtasks move each other whatever the law does, or an empty text."""
@@ -225,7 +231,7 @@ class Comparer:
         return {
             "compared_s": {source: self._seconds(ticks) for source, ticks in self._sides.items()},
             "led_by": dict(self._owned),
-            "moved_m": laws,
+            "moved": laws,
             "note": "paper is the same law as noninteracting on constant inertias"
             if self._recorded.constant
             else None,
@@ -242,7 +248,7 @@ class Comparer:
         values = recorded.task_values(without.q[ticks], without.v[ticks])[0]
         return self._apart(recorded.values[0][rows], values)
 
-    def _moved(self, a: Joints, b: Joints) -> dict[str, float]:
+    def _moved(self, a: Joints, b: Joints) -> dict[str, dict[str, float]]:
         """Largest distance between two runs in each subtask, while both last [m; rad]."""
         count = min(len(a.q), len(b.q))
         values = [self._recorded.task_values(run.q[:count], run.v[:count])[0] for run in (a, b)]
@@ -253,13 +259,16 @@ class Comparer:
         apart = np.abs(self._recorded.stack.difference(a, b)).max(axis=0, initial=0.0)
         return np.where(np.isfinite(apart), apart, np.inf)
 
-    def _by_subtask(self, numbers: Array) -> dict[str, float]:
-        """Largest of each subtask's numbers, of shape (n,)."""
-        stack = self._recorded.stack
-        return {
-            name: float(numbers[part].max())
-            for name, part in zip(stack.names, stack.slices, strict=True)
-        }
+    def _by_subtask(self, numbers: Array) -> dict[str, dict[str, float]]:
+        """Largest of each subtask's numbers by unit, of shape (n,)."""
+        stack, units = self._recorded.stack, np.array(self._units)
+        found: dict[str, dict[str, float]] = {}
+        for name, part in zip(stack.names, stack.slices, strict=True):
+            own, numbers_of = units[part], numbers[part]
+            found[name] = {
+                unit: float(numbers_of[own == unit].max()) for unit in dict.fromkeys(own.tolist())
+            }
+        return found
 
     def _incomparable(self, ignored: str) -> str:
         """Why the recording is not what its scenario alone gives, inputs to one subtask aside."""

@@ -43,8 +43,8 @@ class Errors:
     Attributes:
         law: What led it.
         rate: Ticks per second [Hz].
-        position: Largest error of each subtask's positions [m], 0 where it has none.
-        angle: Largest angle error of each subtask's rotations [rad], 0 where it has none.
+        position: Largest error of a coordinate of each subtask that has positions [m].
+        angle: Largest error of each subtask that has rotations or angles [rad].
         speed: Largest speed of the desired motions [m/s].
         turning: Largest angular speed of the desired motions [rad/s].
         damping_per_tick: Largest eigenvalue of inertia^-1 D at the start, times the tick; a loop
@@ -123,9 +123,11 @@ def measure_law(scenario: Scenario, law: str, rate: float, duration: float) -> E
     e, speeds, acted = (np.array(column) for column in zip(*ticks, strict=True))
     position, angle = {}, {}
     for task, part in zip(rehearsal.stack.subtasks, rehearsal.stack.slices, strict=True):
-        linear, angular = e[:, part][:, task.layout.rates], e[:, part][:, task.layout.angular]
-        position[task.name] = float(np.abs(linear).max(initial=0.0))
-        angle[task.name] = float(np.linalg.norm(angular, axis=2).max(initial=0.0))
+        sizes, lengths = task.magnitudes(e[:, part]), np.array(task.units) == "m"
+        if lengths.any():
+            position[task.name] = float(np.abs(e[:, part][:, lengths]).max())
+        if "rad" in sizes:
+            angle[task.name] = float(sizes["rad"].max())
     speed, turning = (float(largest) for largest in speeds.max(axis=0))
     damping = _damping_per_tick(rehearsal, first, law) / rate
     intervened = bool(acted.any()) and law != COMPLIANCE
@@ -183,7 +185,10 @@ def order_of_fall(rows: Sequence[Errors], subtask: str) -> float | None:
     rows = [row for row in rows if row.law == rows[0].law and row.damping_per_tick < STABLE]
     if len(rows) < 2:
         return None
-    first, last = (max(row.position[subtask], row.angle[subtask]) for row in (rows[0], rows[-1]))
+    first, last = (
+        max(row.position.get(subtask, 0.0), row.angle.get(subtask, 0.0))
+        for row in (rows[0], rows[-1])
+    )
     if not (first > 0.0 and last > 0.0):
         return None
     return math.log(first / last) / math.log(rows[-1].rate / rows[0].rate)
@@ -191,11 +196,12 @@ def order_of_fall(rows: Sequence[Errors], subtask: str) -> float | None:
 
 def laws_metrics(rows: Sequence[Errors], duration: float) -> dict[str, object]:
     """The rows as they stand in `metrics.json`."""
+    names = dict.fromkeys([*rows[0].position, *rows[0].angle])
     return {
         "duration_s": duration,
         "speed_m_per_s": rows[0].speed,
         "turning_rad_per_s": rows[0].turning,
-        "order_of_fall": {name: order_of_fall(rows, name) for name in rows[0].position},
+        "order_of_fall": {name: order_of_fall(rows, name) for name in names},
         "rows": [
             {
                 "law": row.law,

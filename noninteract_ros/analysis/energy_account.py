@@ -1,32 +1,31 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Storage functions (32) of a run and their rates (33): what a passive subtask must show."""
+"""Storage functions (32) of a run and their rates (33): what a passive subtask must show.
 
+Each claim is judged over the intervals in which it can hold: where law and gains in force alone
+made the torques, nobody put the team elsewhere and, but for (33), the law was one that decouples.
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from noninteract_ros.analysis import intervals
 from noninteract_ros.analysis.checks import Check, at_least, at_most, not_applicable
 from noninteract_ros.analysis.holding import Holding
-from noninteract_ros.analysis.recorded import (
-    FRICTION,
-    INTERVENTIONS,
-    Motion,
-    Recorded,
-    common_instants,
-    select,
-)
+from noninteract_ros.analysis.intervals import pieces
+from noninteract_ros.analysis.recorded import FRICTION, Motion, Recorded, common_instants, select
 from noninteract_ros.arrays import Array
-from noninteract_ros.subtasks.layout import Layout
 
-LAWS = ("energy_gated", "noninteracting", "paper")
 GROWTH = 1e-8  # share of the peak at 1 kHz: what holding the torque over a tick can leave
 PASSIVE = 1e-3  # share of the peak at 1 kHz by which (31) may be missed for the same reason
 SAMPLED = 0.02  # share of the peak at 1 kHz: powers are sampled where the torque is fresh
-JUMP = 1e-4  # [m; rad] a desired motion that leaves its own path by more has jumped
 UNEXPLAINED = 0.2  # share of the work of holding the torque that its mean force may miss
+ROUNDING = 1e-18  # [J] what errors of some 1e-12 m, and less, store
+NEVER = "at no time did the law alone make the torques"
+DISTURBED = "no time with a still reference and without external force"
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,9 @@ class Account:
         supplied: Power from outside, shape (n,) [W].
         desired: Desired motion at the same instants.
         velocity_error: Shape (n, p) [m/s; rad/s].
-        in_force: Whether nothing but the law gave torques, from each instant to the next, shape
-            (n - 1,): no singularity and no limit of a joint.
+        law: Law in force, shape (n,).
+        in_force: Whether that law alone moved the team from each instant to the next, shape
+            (n - 1,): no limit, no change that fades in, no stop, and nobody put it elsewhere.
     """
 
     t: Array
@@ -50,7 +50,28 @@ class Account:
     supplied: Array
     desired: Motion
     velocity_error: Array
+    law: NDArray[np.str_]
     in_force: NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a claim found, over the intervals in which it can hold.
+
+    Attributes:
+        value: The largest that was found [J].
+        limit: What it may be [J].
+        reason: Why there is nothing to judge, or an empty text.
+    """
+
+    value: float
+    limit: float
+    reason: str = ""
+
+    @property
+    def told(self) -> float | None:
+        """The value; None where there is none."""
+        return None if self.reason else self.value
 
 
 def account(recorded: Recorded, subtask: str) -> Account:
@@ -66,9 +87,9 @@ def account(recorded: Recorded, subtask: str) -> Account:
     storage, rate, supplied = (series[key][rows] for key in ("storage", "rate", "supplied"))
     desired = select(tracking.desired, others)
     velocity_error = tracking.actual.velocity[others] - desired.velocity
-    told = INTERVENTIONS in series.labels
-    in_force = np.diff(series[INTERVENTIONS][rows] if told else np.zeros(len(rows))) == 0.0
-    return Account(t[rows], storage, rate, supplied, desired, velocity_error, in_force)
+    in_force = intervals.by_law_alone(series, rows) & intervals.without_jumps(recorded, t[rows])
+    law = intervals.laws(recorded, t[rows])
+    return Account(t[rows], storage, rate, supplied, desired, velocity_error, law, in_force)
 
 
 def energy_metrics(
@@ -79,49 +100,159 @@ def energy_metrics(
     Args:
         recorded: The run.
         subtask: Name of the subtask.
-        holding: Of a team without constant inertias, what holding the torque does to it. Its work
-            bounds growth (31) and explains what the balance (33) misses.
+        holding: What holding the torque over a tick does, where that is known; its work supplies
+            the subtask as well.
 
     Raises:
         RecordingError: A topic is missing or of another type.
     """
     found = account(recorded, subtask)
     work = _holding_work(recorded, subtask, found, holding) if holding else np.zeros(len(found.t))
-    peak = float(found.storage.max(initial=0.0))
-    growth, growth_reason = _growth(recorded, subtask, found)
-    excess, mismatch, blind = _against_supply(recorded, subtask, found, work)
-    excess_reason = blind or _crossing(recorded)
+    judge = _Judge(recorded, subtask, found, work)
     lowest = float(found.storage.min(initial=np.inf))
-    held = float(np.abs(np.diff(work)).sum())
+    claims = {"growth": judge.growth(), "passive": judge.excess(), "rate": judge.mismatch()}
     metrics = {
         "storage_min_J": lowest,
-        "storage_max_J": peak,
+        "storage_max_J": float(found.storage.max(initial=0.0)),
         "storage_final_J": float(found.storage[-1]),
-        "growth_while_undisturbed_J": growth,
-        "growth_reason": growth_reason or None,
-        "rise_beyond_supply_J": None if blind else excess,
-        "rate_mismatch_J": None if blind else mismatch,
-        "rate_reason": blind or None,
-        "work_of_holding_J": held if holding else None,
+        "growth_while_undisturbed_J": claims["growth"].told,
+        "growth_reason": claims["growth"].reason or None,
+        "rise_beyond_supply_J": claims["passive"].told,
+        "rise_reason": claims["passive"].reason or None,
+        "rate_mismatch_J": claims["rate"].told,
+        "rate_reason": claims["rate"].reason or None,
+        "judged_s": float(np.diff(found.t)[found.in_force].sum()),
+        "work_of_holding_J": float(np.abs(np.diff(work)).sum()) if holding else None,
     }
-    coarse = 1000.0 / recorded.rate
-    # Where subtasks supply each other, what passes through one is not bounded by what it stores.
-    passing = _largest_storage(recorded) if _crossing(recorded) else peak
-    supplied = (1.0 + UNEXPLAINED) * held
-    claims = (
-        ("growth", growth or 0.0, GROWTH * peak * coarse**3 + supplied, growth_reason),
-        ("passive", excess, PASSIVE * peak * coarse + supplied, excess_reason),
-        ("rate", mismatch, SAMPLED * passing * coarse + UNEXPLAINED * held, blind),
-    )
     checks = [at_least(f"storage_positive.{subtask}", lowest, 0.0, "J")]
-    for claim, value, limit, reason in claims:
+    for claim, item in claims.items():
         name = f"storage_{claim}.{subtask}"
         checks.append(
-            not_applicable(name, limit, "J", reason)
-            if reason
-            else at_most(name, value, limit, "J")
+            not_applicable(name, item.limit, "J", item.reason)
+            if item.reason
+            else at_most(name, item.value, item.limit, "J")
         )
     return metrics, checks
+
+
+class _Judge:
+    """Judges the claims about one subtask.
+
+    Args:
+        recorded: The run.
+        subtask: Name of the subtask.
+        found: Its account.
+        work: Work of holding the torque since the first instant, shape (n,) [J].
+    """
+
+    def __init__(self, recorded: Recorded, subtask: str, found: Account, work: Array) -> None:
+        self._recorded, self._subtask = recorded, subtask
+        self._found, self._work = found, work
+        self._coarse = 1000.0 / recorded.rate
+        self._decoupled = intervals.decoupled(found.law)
+        jumped = intervals.jumps(recorded.task(subtask).layout, found.desired)
+        self._told = ~jumped & intervals.felt(recorded, found.t) & found.in_force
+
+    def growth(self) -> Judged:
+        """Largest growth over any time with a still reference and nothing that acts on it."""
+        found, work, recorded = self._found, self._work, self._recorded
+        quiet = intervals.still(found.desired) & intervals.untouched(recorded, found.t)
+        where = quiet & found.in_force & self._decoupled
+
+        def growth(piece: slice) -> float:
+            return _rise(found.storage[piece] - work[piece])
+
+        limit = max(GROWTH * self._peak(where) * self._coarse**3, self._unexplained(where))
+        reason = self._crossing() or _rubbing(recorded)
+        return _judged(where, reason, DISTURBED, growth, limit)
+
+    def excess(self) -> Judged:
+        """Largest rise beyond what was supplied (31), wherever the law decouples."""
+        found, work, where = self._found, self._work, self._told & self._decoupled
+
+        def excess(piece: slice) -> float:
+            supply = integral(found.t[piece], found.supplied[piece]) + work[piece]
+            return _rise(found.storage[piece] - supply)
+
+        limit = max(PASSIVE * self._peak(where) * self._coarse, self._unexplained(where))
+        return _judged(where, self._blind() or self._crossing(), NEVER, excess, limit)
+
+    def mismatch(self) -> Judged:
+        """Largest difference from the integrated rate (33), under any law.
+
+        Where subtasks supply each other, what passes through one is not bounded by what it stores.
+        """
+        found, work = self._found, self._work
+
+        def mismatch(piece: slice) -> float:
+            supply = integral(found.t[piece], found.rate[piece]) + work[piece]
+            missed = found.storage[piece] - supply
+            return float(np.abs(missed - missed[0]).max())
+
+        apart, together = self._told & self._decoupled, self._told & ~self._decoupled
+        judged = []
+        for where, peak in (
+            (apart, self._peak(apart)),
+            (together, _largest_storage(self._recorded) if together.any() else 0.0),
+        ):
+            limit = max(SAMPLED * peak * self._coarse, self._unexplained(where))
+            judged.append(_judged(where, self._blind(), NEVER, mismatch, limit))
+        return max(judged, key=lambda item: (not item.reason, item.value - item.limit))
+
+    def _peak(self, where: NDArray[np.bool_]) -> float:
+        """Largest storage at the ends of some intervals [J]."""
+        ends = np.concatenate((where, [False])) | np.concatenate(([False], where))
+        return float(self._found.storage[ends[: len(self._found.t)]].max(initial=0.0))
+
+    def _unexplained(self, where: NDArray[np.bool_]) -> float:
+        """What the work of holding the torque may be wrong by, over some intervals [J]."""
+        return UNEXPLAINED * float(np.abs(np.diff(self._work))[where].sum())
+
+    def _crossing(self) -> str:
+        """Why the storage may grow at the cost of another subtask's, or an empty text."""
+        if reason := _late(self._recorded):
+            return reason
+        if self._decoupled.any() or not len(self._found.law):
+            return ""
+        names = " and ".join(dict.fromkeys(self._found.law.tolist()))
+        return f"under law {names} other subtasks supply it too"
+
+    def _blind(self) -> str:
+        """Why nobody told the supply, or an empty text."""
+        recorded = self._recorded
+        scenario = recorded.scenario
+        pushed = any(recorded.has(f"{robot}/push") for robot in scenario.robots)
+        loaded = scenario.held is not None or scenario.pushes or pushed
+        if loaded and set(scenario.robots) - set(scenario.general.force_sensors):
+            return "the controller has no force sensors on every robot"
+        return _late(recorded) or _rubbing(recorded) or _linked(recorded, self._subtask)
+
+
+def _judged(
+    where: NDArray[np.bool_],
+    reason: str,
+    otherwise: str,
+    measure: Callable[[slice], float],
+    limit: float,
+) -> Judged:
+    """The largest over all pieces of a run in which a claim can hold.
+
+    Args:
+        where: Intervals in which it can.
+        reason: Why it cannot be judged at all, or an empty text.
+        otherwise: What to say where there is no such interval.
+        measure: Takes the instants of a piece.
+        limit: What it may be [J].
+    """
+    limit += ROUNDING
+    if reason or not where.any():
+        return Judged(0.0, limit, reason or otherwise)
+    return Judged(max(measure(slice(a, b + 1)) for a, b in pieces(where)), limit)
+
+
+def _rise(storage: Array) -> float:
+    """Largest growth from any instant to a later one [J]."""
+    return float((storage - np.minimum.accumulate(storage)).max())
 
 
 def _largest_storage(recorded: Recorded) -> float:
@@ -136,14 +267,6 @@ def _holding_work(recorded: Recorded, subtask: str, found: Account, holding: Hol
     rows, others = common_instants(found.t, holding.t)
     force[rows] = holding.force[others][:, recorded.part(subtask)]
     return integral(found.t, (found.velocity_error * force).sum(axis=1))
-
-
-def _crossing(recorded: Recorded) -> str:
-    """Why a subtask's storage may grow at the cost of another's, or an empty text."""
-    law = recorded.scenario.general.law
-    if reason := _late(recorded):
-        return reason
-    return "" if law in LAWS else f"under law {law} other subtasks supply it too"
 
 
 def _late(recorded: Recorded) -> str:
@@ -164,100 +287,6 @@ def _linked(recorded: Recorded, subtask: str) -> str:
     return "references over a link have no acceleration" if over_link else ""
 
 
-def _growth(recorded: Recorded, subtask: str, found: Account) -> tuple[float | None, str]:
-    """Largest growth over any time with a still reference and nothing that acts from outside."""
-    if reason := _crossing(recorded) or _rubbing(recorded):
-        return None, reason
-    quiet = _still(found.desired) & _untouched(recorded, found.t) & found.in_force
-    if not quiet.any():
-        return None, "no time with a still reference and without external force"
-    largest = 0.0
-    for first, last in pieces(quiet):
-        storage = found.storage[first : last + 1]
-        lowest = np.minimum.accumulate(storage)
-        largest = max(largest, float((storage - lowest).max()))
-    return largest, ""
-
-
-def _against_supply(
-    recorded: Recorded, subtask: str, found: Account, work: Array
-) -> tuple[float, float, str]:
-    """Storage against integrated powers, over pieces without a jump of the reference.
-
-    Where a person pushes a robot elsewhere than at its tool nobody has told the supply.
-
-    Returns:
-        Largest rise beyond what was supplied (31) [J], largest difference from the integrated
-        rate (33) [J], and why neither can be told, or an empty text.
-    """
-    loaded = recorded.scenario.held is not None or recorded.scenario.pushes
-    unseen = set(recorded.scenario.robots) - set(recorded.scenario.general.force_sensors)
-    if loaded and unseen:
-        return 0.0, 0.0, "the controller has no force sensors on every robot"
-    if reason := _late(recorded) or _rubbing(recorded) or _linked(recorded, subtask):
-        return 0.0, 0.0, reason
-    excess = mismatch = 0.0
-    told = ~jumps(recorded.task(subtask).layout, found.desired)
-    told &= _felt(recorded, found.t) & found.in_force
-    for first, last in pieces(told):
-        piece = slice(first, last + 1)
-        gain = found.storage[piece] - found.storage[first]
-        unsupplied = gain - integral(found.t[piece], found.supplied[piece])
-        excess = max(excess, float((unsupplied - np.minimum.accumulate(unsupplied)).max()))
-        rest = gain - integral(found.t[piece], found.rate[piece]) - (work[piece] - work[first])
-        mismatch = max(mismatch, float(np.abs(rest).max()))
-    return excess, mismatch, ""
-
-
 def integral(t: Array, power: Array) -> Array:
     """Energy since the first instant by the trapezoidal rule, shape (n,) [J]."""
     return np.concatenate(([0.0], np.cumsum(np.diff(t) * (power[1:] + power[:-1]) / 2)))
-
-
-def _still(desired: Motion) -> NDArray[np.bool_]:
-    """Whether the reference stands still from each instant to the next, shape (n - 1,)."""
-    rest = (desired.velocity == 0.0).all(axis=1) & (desired.acceleration == 0.0).all(axis=1)
-    same = (desired.position[1:] == desired.position[:-1]).all(axis=1)
-    return np.asarray(rest[1:] & rest[:-1] & same)
-
-
-def jumps(layout: Layout, desired: Motion) -> NDArray[np.bool_]:
-    """Whether the reference jumps between each instant and the next, shape (n - 1,)."""
-    h = np.diff(desired.t)[:, None]
-    x, v, a = desired.position, desired.velocity, desired.acceleration
-    way = layout.difference(x[1:], x[:-1])
-    ahead = way - h * v[:-1] - 0.5 * h * h * a[:-1]
-    back = way - h * v[1:] + 0.5 * h * h * a[1:]
-    gap = np.minimum(np.abs(ahead), np.abs(back))
-    # A jump in velocity alone shows as one in position only half as well.
-    kick = np.abs(v[1:] - v[:-1] - 0.5 * h * (a[1:] + a[:-1]))
-    return np.asarray(((gap > JUMP) | (h * kick > JUMP)).any(axis=1))
-
-
-def _felt(recorded: Recorded, t: Array) -> NDArray[np.bool_]:
-    """Whether tools feel all that pushes, from each instant to the next, shape (n - 1,)."""
-    felt = np.ones(max(len(t) - 1, 0), dtype=bool)
-    for push in recorded.scenario.pushes.values():
-        if not push.on_tool(recorded.team):
-            felt &= (t[1:] <= push.start) | (t[:-1] >= push.start + push.duration)
-    return felt
-
-
-def _untouched(recorded: Recorded, t: Array) -> NDArray[np.bool_]:
-    """Whether nothing acts from outside from each instant to the next, shape (n - 1,)."""
-    free = np.ones(len(t), dtype=bool)
-    for robot in recorded.scenario.robots:
-        if not recorded.has(f"{robot}/external_wrench"):
-            return np.zeros(max(len(t) - 1, 0), dtype=bool)
-        series = recorded.run.wrench(f"{robot}/external_wrench")
-        rows, others = common_instants(t, recorded.since_start(series.stamps))
-        known = np.zeros(len(t), dtype=bool)
-        known[rows] = ~(series.force[others].any(axis=1) | series.torque[others].any(axis=1))
-        free &= known
-    return np.asarray(free[1:] & free[:-1]) & _felt(recorded, t)
-
-
-def pieces(holds: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and last instant of each piece in which every step holds."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], holds, [False])).astype(int)))
-    return [(first, last) for first, last in pairwise(edges.tolist()) if holds[first]]

@@ -84,7 +84,8 @@ def tracking_figure(recorded: Recorded, subtask: str) -> Figure:
         axes = rows[column]
         draw_one = _draw_few if len(task.elements) <= FEW else _draw_many
         draw_one(axes, tracking, actual[:, :, column], desired[:, :, column], task.elements)
-        named = f"{axis} [{task.unit}]" if task.unit == "m" else f"[{task.unit}]"
+        units = ", ".join(dict.fromkeys(task.element_units))
+        named = f"{axis} [{units}]" if units == "m" else f"[{units}]"
         axes.set_ylabel(f"{_quantity(subtask, task.elements)}\n{named}")
         axes.margins(x=0.0)
     if task.rotates:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What holding the torque over a tick does to subtasks whose inertia depends on where the team is.
+"""What holding the torque over a tick does to the subtasks.
 
 The law finds tau_k at tick k and the team holds it until tick k + 1, where the law asks for
 tau_k+1. In between the law would have led from the one to the other, so that on the average half
@@ -70,15 +70,26 @@ def recorded_holding(recorded: Recorded) -> Holding:
 
 def holding_force(recorded: Recorded, q: Array, v: Array, changes: Array) -> Array:
     """The force at states q (m, nq), v (m, n) for changes of the torque (m, n), shape (m, n)."""
-    inertias, slices = impedance_of(recorded).inertias, recorded.stack.slices
-    force = np.empty_like(v)
-    for row, (q_k, v_k, change) in enumerate(zip(q, v, changes, strict=True)):
-        state = recorded.team.state(q_k, v_k)
-        terms = task_dynamics(state, recorded.stack.evaluate(state), slices, inertias)
-        missing = terms.J @ np.linalg.solve(terms.M, -0.5 * change)
-        for part, inertia in zip(slices, terms.inertias, strict=True):
-            force[row, part] = inertia @ missing[part]
-    return force
+    impedance = impedance_of(recorded)
+    if recorded.constant:
+        return -0.5 * changes @ _seen_by_subtasks(recorded, impedance, recorded.team.q0, v[0]).T
+    states = zip(q, v, changes, strict=True)
+    return np.array(
+        [
+            -0.5 * _seen_by_subtasks(recorded, impedance, q_k, v_k) @ change
+            for q_k, v_k, change in states
+        ]
+    ).reshape(v.shape)
+
+
+def _seen_by_subtasks(recorded: Recorded, impedance: Impedance, q: Array, v: Array) -> Array:
+    """M_i J_i M^-1 of all subtasks at a state, shape (n, n): what a torque is to them."""
+    state, slices = recorded.team.state(q, v), recorded.stack.slices
+    terms = task_dynamics(state, recorded.stack.evaluate(state), slices, impedance.inertias)
+    seen = np.linalg.solve(terms.M, terms.J.T).T
+    for part, inertia in zip(slices, terms.inertias, strict=True):
+        seen[part] = inertia @ seen[part]
+    return np.asarray(seen)
 
 
 def deflection(impedance: Impedance, force: Array, duration: float) -> Array:

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from noninteract_ros.analysis.intervals import laws
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.clock import seconds, stamp
+from noninteract_ros.control.decoupling import LAWS
 from noninteract_ros.control.inputs import SOURCES
 from noninteract_ros.operator.narrator import Sampler
 
@@ -80,25 +82,33 @@ def _unforeseen(
 
 
 def _changes(recorded: Recorded) -> list[Influence]:
-    """Changes of law and authority and stops, as far as the controller's diagnostics say so."""
-    if not recorded.has("diagnostics"):
-        return []
-    texts: dict[str, None] = {}
-    for status in recorded.run.diagnostics():
+    """Changes of law and authority, stops and new starts, as far as the controller told."""
+    own = recorded.scenario.general.law
+    told = {str(law) for law in laws(recorded, recorded.t)} - {own}
+    texts = {f"law changed to {law}": None for law in LAWS if law in told}
+    changed: dict[str, None] = {}  # The controller tells of all that were changed so far.
+    for status in recorded.run.diagnostics() if recorded.has("diagnostics") else ():
         if not status["name"].endswith("controller"):
             continue
         values = status["values"]
-        if values.get("law", recorded.scenario.general.law) != recorded.scenario.general.law:
-            texts[f"law changed to {values['law']}"] = None
+        if (law := values.get("law", own)) != own:
+            texts[f"law changed to {law}"] = None
         start = values.get("last start", "none")
         if start not in ("none", FIRST_START):
             texts[f"the controller started anew: {start}"] = None
-        if (changed := values.get("changed parameters", "none")) != "none":
-            texts[f"parameters were changed: {changed}"] = None
+        if (names := values.get("changed parameters", "none")) != "none":
+            changed |= dict.fromkeys(names.split(", "))
         if status["message"] == "stopped":
             texts["the controller was stopped"] = None
         for name, spec in recorded.scenario.subtasks.items():
             led_by = values.get(f"{name} led by", spec.input.authority).split(",")[0]
             if led_by not in (spec.input.authority, *spec.input.hand_over_to):
                 texts[f"authority over {name} changed to {led_by}"] = None
+    if changed:
+        texts[f"parameters were changed: {', '.join(changed)}"] = None
+    counts = recorded.told(recorded.stack.names[0], "transitions")
+    if not texts and counts is not None and np.ptp(counts[1]) > 0.0:
+        texts["a stop, a change of law or gains, or a new start"] = (
+            None  # Too short to be told of.
+        )
     return [Influence("", text) for text in texts]

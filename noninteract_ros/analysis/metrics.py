@@ -61,8 +61,7 @@ def measure(recorded: Recorded, other_laws: bool = True) -> Findings:
     }
     closed, closed_checks = closed_form_metrics(recorded, outside)
     comparison = Comparer(recorded, outside, other_laws).compare()
-    varying = recorded.lockstep and not recorded.constant
-    holding = recorded_holding(recorded) if varying else None
+    holding = recorded_holding(recorded) if recorded.lockstep else None
     energies: dict[str, Any] = {}
     energy_checks: list[Check] = []
     for name in recorded.stack.names:
@@ -145,36 +144,33 @@ def completeness_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check
 
 
 def tracking_metrics(recorded: Recorded, subtask: str) -> dict[str, Any]:
-    """Errors from the first reference on: Euclidean norm of each element, angle of each rotation.
+    """Errors from the first reference on: distance of each element, angle of each rotation.
+
+    A subtask that nobody leads is to stay where it is, all the time.
 
     Raises:
         RecordingError: A topic is missing or of another type.
     """
     tracking = recorded.tracking(subtask)
     start = recorded.start(subtask)
-    if start is None:
-        return {"reason": "nothing led it"}
-    rows = tracking.t >= start - 1e-9
+    rows = tracking.t >= (tracking.t[:1].min(initial=0.0) if start is None else start) - 1e-9
     if not rows.any():
         return {"reason": "no values while it was led"}
-    layout, axes = recorded.task(subtask).layout, len(recorded.task(subtask).axes)
-    e = layout.difference(tracking.actual.position[rows], tracking.desired.position[rows])
+    task = recorded.task(subtask)
+    e = task.difference(tracking.actual.position[rows], tracking.desired.position[rows])
     metrics: dict[str, Any] = {"led_from_s": start}
-    if axes:
-        norms = np.linalg.norm(e[:, layout.rates].reshape(len(e), -1, axes), axis=2)
-        metrics |= _extremes(norms, "m")
-    if layout.rotates:
-        metrics |= _extremes(np.linalg.norm(e[:, layout.angular], axis=2), "rad")
+    for unit, sizes in task.magnitudes(e).items():
+        metrics |= _extremes(sizes, unit)
     return metrics
 
 
-def _extremes(norms: Array, unit: str) -> dict[str, float]:
+def _extremes(sizes: Array, unit: str) -> dict[str, float]:
     """First, largest, mean and last of errors, shape (n, elements)."""
     return {
-        f"initial_error_{unit}": float(norms[0].max()),
-        f"max_error_{unit}": float(norms.max()),
-        f"rms_error_{unit}": float(np.sqrt((norms**2).mean())),
-        f"final_error_{unit}": float(norms[-1].max()),
+        f"initial_error_{unit}": float(sizes[0].max()),
+        f"max_error_{unit}": float(sizes.max()),
+        f"rms_error_{unit}": float(np.sqrt((sizes**2).mean())),
+        f"final_error_{unit}": float(sizes[-1].max()),
     }
 
 
@@ -194,10 +190,15 @@ def closed_form_metrics(
         metrics[name] = {
             "from_s": found.start,
             "states": len(found.t),
-            "inertia_diagonal_kg": np.diag(found.inertia).tolist(),
-            "max_deviation_m": float(np.abs(found.deviation).max()),
-            "rms_deviation_m": float(np.sqrt((found.deviation**2).mean())),
+            "inertia_diagonal": np.diag(found.inertia).tolist(),
         }
+        units = np.array(recorded.task(name).units)
+        for unit in dict.fromkeys(units.tolist()):
+            off = found.deviation[:, units == unit]
+            metrics[name] |= {
+                f"max_deviation_{unit}": float(np.abs(off).max()),
+                f"rms_deviation_{unit}": float(np.sqrt((off**2).mean())),
+            }
         checks.append(closed_form_check(recorded, name, found))
     return metrics, checks
 

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noninteract_ros.analysis.checks import Check, at_most, not_applicable
+from noninteract_ros.analysis.intervals import moved, moved_by_itself
 from noninteract_ros.analysis.recorded import Recorded, common_instants
 from noninteract_ros.analysis.team_account import TeamAccount, limits_acted, team_account
 from noninteract_ros.arrays import Array
@@ -68,7 +69,7 @@ class Observation:
 
     @property
     def gaps(self) -> int:
-        """How many times states are missing."""
+        """How many times states are missing, or the team was put elsewhere."""
         return int(self.piece[-1])
 
     @property
@@ -79,17 +80,17 @@ class Observation:
 
 def observe(recorded: Recorded) -> Observation:
     """Energies at the robots from what joint states and commands say."""
-    seen = np.diff(recorded.ticks) == 1
+    seen = (np.diff(recorded.ticks) == 1) & moved_by_itself(recorded)
     finite = np.isfinite(np.hstack((recorded.q, recorded.v, recorded.torque))).all(axis=1)
     seen &= finite[1:] & finite[:-1]
     rows = np.flatnonzero(seen)
     torque, commanded = _torques(recorded, rows)
-    moved = _moved(recorded, rows)
+    way = moved(recorded, rows)
     kinetic, gravity = _energies(recorded, np.flatnonzero(finite))
     steps = np.zeros((3, len(recorded.t) - 1))
-    steps[0, rows] = (torque * moved).sum(axis=1) - np.diff(gravity)[rows]
+    steps[0, rows] = (torque * way).sum(axis=1) - np.diff(gravity)[rows]
     steps[1, rows] = np.diff(kinetic)[rows] - steps[0, rows]
-    steps[2, rows] = _work_along(recorded, rows, torque, moved)
+    steps[2, rows] = _work_along(recorded, rows, torque, way)
     put_in, received, along = (np.concatenate(([0.0], np.cumsum(row))) for row in steps)
     piece = np.concatenate(([0], np.cumsum(~seen)))
     altered = float(np.abs(torque - recorded.torque[rows + 1]).max(initial=0.0))
@@ -118,14 +119,6 @@ def _torques(recorded: Recorded, rows: NDArray[np.intp]) -> tuple[Array, NDArray
     return torque, commanded
 
 
-def _moved(recorded: Recorded, rows: NDArray[np.intp]) -> Array:
-    """Tangent vectors from some states to the next ones, shape (m, n)."""
-    q = recorded.q
-    if q.shape[1] == recorded.team.n:
-        return np.asarray(q[rows + 1] - q[rows])
-    return np.array([recorded.team.difference(q[row], q[row + 1]) for row in rows])
-
-
 def _energies(recorded: Recorded, rows: NDArray[np.intp]) -> tuple[Array, Array]:
     """Kinetic energy and energy in gravity at all states, shape (n,) each; NaN but at some."""
     team, still = recorded.team, np.zeros(recorded.team.n)
@@ -143,7 +136,7 @@ def _energies(recorded: Recorded, rows: NDArray[np.intp]) -> tuple[Array, Array]
     return kinetic, gravity
 
 
-def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, moved: Array) -> Array:
+def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, way: Array) -> Array:
     """Work of all that acts from outside along the references, over some ticks, shape (m,) [J].
 
     NaN where nobody recorded the references.
@@ -155,7 +148,7 @@ def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, moved
     team, rate = recorded.team, recorded.rate
     for number in np.flatnonzero(wanted.any(axis=1)):
         row = rows[number]
-        q = team.integrate(recorded.q[row], 0.5 * moved[number])
+        q = team.integrate(recorded.q[row], 0.5 * way[number])
         v = 0.5 * (recorded.v[row] + recorded.v[row + 1])
         acceleration = (recorded.v[row + 1] - recorded.v[row]) * rate
         external = team.inverse_dynamics(q, v, acceleration) - torque[number]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from noninteract_ros.analysis.run import Run
 from noninteract_ros.analysis.series import JointSeries, TrajectorySeries
 from noninteract_ros.arrays import Array
+from noninteract_ros.control.subtask_input import AUTHORITIES
 from noninteract_ros.errors import RecordingError, ScenarioError
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario_blocks import description_topics
@@ -193,19 +194,28 @@ class Recorded:
         topic = f"{subtask}/{authority}/reference"
         return topic if self.has(topic) else None
 
+    def told(self, subtask: str, label: str) -> tuple[Array, Array] | None:
+        """Times [s] and values of a number on a subtask's account, shape (n,) each, if told."""
+        if not self.has(topic := f"{subtask}/energy"):
+            return None
+        series = self.run.labelled(topic)
+        if label not in series.labels:
+            return None
+        return self.since_start(series.stamps), series[label]
+
     def interventions(self, end: float = np.inf) -> int:
         """Ticks up to a time [s] whose torque was another one than the law's, as it was told."""
-        topic = f"{self.stack.names[0]}/energy"
-        if not self.has(topic):
+        if (told := self.told(self.stack.names[0], INTERVENTIONS)) is None:
             return 0
-        series = self.run.labelled(topic)
-        if INTERVENTIONS not in series.labels:
-            return 0
-        counts = series[INTERVENTIONS][self.since_start(series.stamps) <= end]
-        return int(counts.max(initial=0.0))
+        t, counts = told
+        return int(counts[t <= end].max(initial=0.0))
 
     def start(self, subtask: str) -> float | None:
-        """Time of the first reference that leads a subtask [s]; None where there is none."""
+        """When a subtask is first led [s]; None where nobody leads it."""
+        if (told := self.told(subtask, "leader")) is not None:
+            t, leader = told
+            led = t[leader != AUTHORITIES.index("hold")]
+            return float(led[0]) if len(led) else None
         topic = self.reference_topic(subtask)
         if topic is None:
             return None

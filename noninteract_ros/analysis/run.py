@@ -74,6 +74,8 @@ class Run:
         """
         path = Path(path)
         file = path / FILE_NAME if path.is_dir() else path
+        if path.is_dir() and not file.exists():
+            raise RecordingError(f"{path}: is no run: the folder holds no {FILE_NAME}")
         loader = _Loader(file)
         for opcode, body in records.read_records(file):
             loader.add(opcode, body)

@@ -26,7 +26,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noninteract_ros.analysis.checks import Check, at_least, not_applicable
-from noninteract_ros.analysis.energy_account import integral, jumps, pieces
+from noninteract_ros.analysis.energy_account import integral
+from noninteract_ros.analysis.intervals import jumps, pieces
 from noninteract_ros.analysis.processes import in_processes
 from noninteract_ros.analysis.recorded import FRICTION, Motion
 from noninteract_ros.arrays import Array

@@ -4,17 +4,21 @@
 from typing import TYPE_CHECKING, Any
 
 from rich.table import Column, Table
+from rich.text import Text
 
 from noninteract_ros.analysis.checks import Check
 
 if TYPE_CHECKING:
     from noninteract_ros.analysis.report import Report
 
+UNITS = ("m", "rad")
+
 
 def tables(report: "Report") -> list[Table]:
-    """Checks, tracking and the comparison of laws."""
+    """Checks, why some do not apply, tracking and the comparison of laws."""
     return [
         checks_table(report.checks),
+        notes_table(report.checks),
         tracking_table(report.metrics),
         *crossing_tables(report.metrics),
         *([laws_table(report.metrics["laws"])] if "laws" in report.metrics else []),
@@ -23,56 +27,77 @@ def tables(report: "Report") -> list[Table]:
 
 
 def checks_table(checks: tuple[Check, ...]) -> Table:
-    """A row for each check; what does not apply says why."""
+    """A row for each check; what does not apply refers to a note that says why."""
     titles = ("check", "found", "bound", "unit", "")
-    table = Table(*(Column(title, no_wrap=True) for title in titles), caption_justify="left")
-    words = {True: "[green]passed[/]", False: "[bold red]FAILED[/]", None: "[dim]n/a[/]"}
+    table = Table(*(Column(title, no_wrap=True) for title in titles))
+    reasons = _reasons(checks)
     for check in checks:
         sign = ">=" if check.at_least else "<="
-        limit = f"{sign} {check.limit:.3g}"
-        found = _number(check.value)
-        table.add_row(check.name, found, limit, check.unit, words[check.passed])
-    reasons = dict.fromkeys(check.reason for check in checks if check.passed is None)
-    table.caption = "\n".join(f"n/a: {reason}" for reason in reasons) or None
+        word = "[green]passed[/]" if check.passed else "[bold red]FAILED[/]"
+        if check.passed is None:
+            word = f"[dim]n/a ({reasons.index(check.reason) + 1})[/]"
+        limit = "-" if check.passed is None else f"{sign} {check.limit:.3g}"
+        table.add_row(check.name, _number(check.value), limit, check.unit, word)
     return table
 
 
+def notes_table(checks: tuple[Check, ...]) -> Table:
+    """Why checks do not apply, a row for each reason, numbered as in the table of checks."""
+    table = Table.grid(padding=(0, 1))
+    for number, reason in enumerate(_reasons(checks), start=1):
+        table.add_row(f"n/a ({number}):", Text(reason))
+    return table
+
+
+def _reasons(checks: tuple[Check, ...]) -> list[str]:
+    return list(dict.fromkeys(check.reason for check in checks if check.passed is None))
+
+
 def tracking_table(metrics: dict[str, Any]) -> Table:
-    """Errors and the closed form's deviation, a row for each subtask."""
+    """Errors and the closed form's deviation, a row for each subtask and unit."""
     columns = ("max error", "rms error", "final error", "off the closed form")
-    table = Table("subtask", *(f"{name} [m]".replace("[", r"\[") for name in columns))
+    table = Table("subtask", "unit", *columns)
     for name, found in metrics["tracking"].items():
-        keys = ("max_error_m", "rms_error_m", "final_error_m")
-        deviation = metrics["closed_form"].get(name, {}).get("max_deviation_m")
-        numbers = [*(found.get(key) for key in keys), deviation]
-        table.add_row(name, *(_number(value) for value in numbers))
+        units = [unit for unit in UNITS if f"max_error_{unit}" in found]
+        for unit in units:
+            keys = (f"max_error_{unit}", f"rms_error_{unit}", f"final_error_{unit}")
+            deviation = metrics["closed_form"].get(name, {}).get(f"max_deviation_{unit}")
+            numbers = [*(found[key] for key in keys), deviation]
+            table.add_row(name, unit, *(_number(value) for value in numbers))
+        if not units:
+            table.add_row(name, "", found["reason"])
     return table
 
 
 def crossing_tables(metrics: dict[str, Any]) -> list[Table]:
     """How far each source moves each subtask, by law; none without sources."""
     comparison = metrics["comparison"]
-    laws = comparison["moved_m"]
+    laws = comparison["moved"]
     if not comparison["led_by"]:
         return []
-    table = Table("moved by", "subtask", *(rf"{law} \[m]" for law in laws))
+    table = Table("moved by", "subtask", "unit", *laws)
     for source, owned in comparison["led_by"].items():
         for subtask in metrics["run"]["subtasks"]:
-            moved = [laws[law].get(source, {}).get(subtask) for law in laws]
             own = " (its own)" if subtask == owned else ""
-            table.add_row(source, subtask + own, *(_number(value) for value in moved))
+            moved = [laws[law].get(source, {}).get(subtask, {}) for law in laws]
+            for unit in dict.fromkeys(unit for item in moved for unit in item):
+                numbers = (_number(item.get(unit)) for item in moved)
+                table.add_row(source, subtask + own, unit, *numbers)
     return [table]
 
 
 def laws_table(laws: dict[str, Any]) -> Table:
     """Largest errors under each law, and at each rate."""
-    subtasks = list(laws["order_of_fall"])
-    table = Table(
-        "largest error under", r"rate \[Hz]", *(rf"{name} \[m, rad]" for name in subtasks), "D/M"
-    )
+    kinds = [
+        (name, unit)
+        for name in laws["order_of_fall"]
+        for unit in UNITS
+        if name in laws["rows"][0][f"max_error_{unit}"]
+    ]
+    titles = (rf"{name} \[{unit}]" for name, unit in kinds)
+    table = Table("largest error under", r"rate \[Hz]", *titles, "D/M")
     for row in laws["rows"]:
-        errors = (row["max_error_m"], row["max_error_rad"])
-        cells = (", ".join(_number(error[name]) for error in errors) for name in subtasks)
+        cells = (_number(row[f"max_error_{unit}"][name]) for name, unit in kinds)
         law = row["law"] + (" (limits acted)" if row["limits_acted"] else "")
         table.add_row(law, f"{row['rate_Hz']:g}", *cells, _number(row["damping_per_tick"]))
     orders = ", ".join(

@@ -5,8 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from noninteract_ros.analysis.checks import Check, at_least, at_most, not_applicable
+from noninteract_ros.analysis.intervals import laws
 from noninteract_ros.analysis.recorded import INTERVENTIONS, Recorded, common_instants
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.energy_account import QUANTITIES
@@ -25,6 +27,7 @@ class TeamAccount:
 
     Attributes:
         t: Time of the run [s].
+        gated: Whether the law in force has gates.
         storage: T + nu U of the errors [J].
         supplied: Power at the physical port [W].
         dissipated: Power that the impedance takes [W].
@@ -45,6 +48,7 @@ class TeamAccount:
     """
 
     t: Array
+    gated: NDArray[np.bool_]
     storage: Array
     supplied: Array
     dissipated: Array
@@ -75,7 +79,8 @@ def team_account(recorded: Recorded) -> TeamAccount:
     if missing or not len(series.stamps):
         raise RecordingError(f"{recorded.run.path}: {TOPIC} lacks {', '.join(missing) or 'data'}")
     columns = {label: series[label] for label in QUANTITIES}
-    return TeamAccount(recorded.since_start(series.stamps), **columns)
+    t = recorded.since_start(series.stamps)
+    return TeamAccount(t, laws(recorded, t) == GATED, **columns)
 
 
 def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
@@ -86,12 +91,13 @@ def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
     except RecordingError as error:
         reason = str(error)
         return {"reason": reason}, [not_applicable(name, 0.0, "", reason) for name in names]
-    steps = np.diff(found.t, append=found.t[-1])
-    metrics = {
-        "sigma_min": float(found.sigma.min()),
-        "sigma_below_1_s": float(steps[found.sigma < 1.0].sum()),
-        "grip_min": float(found.grip.min()),
-        "grip_below_1_s": float(steps[found.grip < 1.0].sum()),
+    steps, gated = np.diff(found.t, append=found.t[-1]), found.gated
+    metrics: dict[str, Any] = {
+        "gated_s": float(steps[gated].sum()),
+        "sigma_min": float(found.sigma[gated].min()) if gated.any() else None,
+        "sigma_below_1_s": float(steps[gated & (found.sigma < 1.0)].sum()),
+        "grip_min": float(found.grip[gated].min()) if gated.any() else None,
+        "grip_below_1_s": float(steps[gated & (found.grip < 1.0)].sum()),
         "residual_max_J": float(found.residual.max()),
         "tank_min_J": float(found.tank.min()),
         "tank_max_J": float(found.tank.max()),
@@ -124,7 +130,7 @@ def _rounding(recorded: Recorded, found: TeamAccount) -> float:
 def _may_close(recorded: Recorded, found: TeamAccount) -> str:
     """Why a gate may close in this run, or an empty text."""
     scenario = recorded.scenario
-    if scenario.general.law != GATED:
+    if not found.gated.any():
         return f"law {scenario.general.law} has no gates"
     if not recorded.lockstep:
         return "wall time: torques act late, which costs energy"

@@ -97,13 +97,14 @@ class Stage:
     def sample(
         self, time: float, state: Mapping[str, Array], desired: Mapping[str, Array]
     ) -> dict[str, Any]:
-        """Tracking error of each subtask: length of its positions [m], largest angle [rad]."""
+        """Tracking error of each subtask: largest distance [m] and angle [rad] of an element."""
         errors, angles = {}, {}
         for task in self._stack.subtasks:
             if task.name in state and task.name in desired:
                 e = task.difference(state[task.name], desired[task.name])
-                errors[task.name] = float(np.linalg.norm(e[task.layout.rates]))
-                if task.rotates:
-                    turns = np.linalg.norm(e[task.layout.angular], axis=-1)
-                    angles[task.name] = float(turns.max())
+                found = task.magnitudes(e)
+                if "m" in found:
+                    errors[task.name] = float(found["m"].max())
+                if "rad" in found:
+                    angles[task.name] = float(found["rad"].max())
         return {"kind": "sample", "time": time, "errors": errors, "angles": angles}

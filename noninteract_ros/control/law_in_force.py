@@ -41,6 +41,10 @@ class LawInForce:
         self._fade.forget()
         self._stop.forget()
 
+    def changing(self, now: float) -> bool:
+        """Whether something is left of a change of mode at a time [s]."""
+        return self.left is not None or self._fade.active(now)
+
     def blended(
         self,
         mode: Mode,

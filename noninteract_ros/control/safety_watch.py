@@ -17,11 +17,13 @@ class SafetyWatch:
 
     Attributes:
         interventions: Number of ticks so far whose torque was another one than the law's.
+        transitions: Number of ticks so far in which a change of law or gains, a stop or a new
+            start had a part.
     """
 
     def __init__(self, joint_names: Sequence[str]) -> None:
         self._joints = joint_names
-        self.interventions = 0
+        self.interventions = self.transitions = 0
         self._last: dict[str, float] = {}
         self._lowest: dict[str, float] = {}
 
@@ -32,6 +34,7 @@ class SafetyWatch:
     def note(self, now: float, tick: Tick) -> None:
         """Takes one tick, at the team's time [s]."""
         self.interventions += tick.intervened
+        self.transitions += tick.in_transition
         for name, share in self._shares(tick):
             self._lowest[name] = min(share, self._lowest.get(name, share))
         if tick.intervened:

@@ -73,6 +73,11 @@ class Led:
     source: str
     silent: bool
 
+    @property
+    def leader(self) -> str:
+        """Who leads in fact: one that is silent only holds."""
+        return "hold" if self.silent else self.source
+
 
 class SubtaskInput:
     """Sources, authority and desired motion of one subtask.

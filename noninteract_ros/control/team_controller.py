@@ -205,6 +205,7 @@ class TeamController:
         relative = min(regular, self.stack.soundness(seen.state))
         share = self._guard.law_share(relative)
         self.outside.see(step, q, v, applied)
+        in_transition = self._in_transition(now, restarted)
         moment = self._moment(now, seen, led, share, step)
         if share == 1.0:
             self.gate.book(moment, self._mode.law, applied)
@@ -234,7 +235,14 @@ class TeamController:
             safety,
             restarted,
             self.gate.account,
+            self._mode.law,
+            in_transition,
         )
+
+    def _in_transition(self, now: float, restarted: str) -> bool:
+        """Whether something else than law and gains in force takes part in the next torque."""
+        changing = self._law.changing(now) or self._springs.changing
+        return bool(restarted) or self._mode.stopped or changing
 
     def _regulate(self, seen: Seen, wrenches: Array | None, step: float, held: bool) -> None:
         """Integrates what is missing of the force goals, unless something holds the law back."""

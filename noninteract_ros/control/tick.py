@@ -49,6 +49,9 @@ class Tick:
         safety: Why they did.
         restarted: Why every subtask was put to rest where it is, or an empty text.
         account: The energy account as of this tick, kept whatever the law.
+        law: Law in force.
+        in_transition: Whether the torque is not that of this law and these gains alone: a change
+            of them fades in, the team is or was stopped, or it was put to rest where it is.
     """
 
     torque: Array
@@ -66,6 +69,8 @@ class Tick:
     safety: SafetyReport
     restarted: str
     account: Account
+    law: str
+    in_transition: bool
 
     @property
     def intervened(self) -> bool:

@@ -37,6 +37,11 @@ class WaitingSprings:
         return start
 
     @property
+    def changing(self) -> bool:
+        """Whether a change is under way."""
+        return self._start is not None
+
+    @property
     def waiting(self) -> float | None:
         """Progress of a change, 0 to 1, that the tank holds up; None where it does not."""
         return self._progress if self._waits else None

@@ -10,6 +10,7 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.clock import seconds
 from noninteract_ros.control.safety_watch import SafetyWatch
+from noninteract_ros.control.subtask_account import LABELS, rows
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.lockstep import StampOrder, state_lead
@@ -18,8 +19,6 @@ from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.nodes.team_energy import TeamEnergy, told, unsound
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
-
-ENERGY_LABELS = ("time", "storage", "rate", "supplied", "dissipated", "interventions")
 
 
 class Telemetry:
@@ -56,7 +55,7 @@ class Telemetry:
             SubtaskCodec(task.name, task.elements, task.axes, task.rotates)
             for task in stack.subtasks
         ]
-        self._energy_codec = EnergyCodec(ENERGY_LABELS)
+        self._energy_codec = EnergyCodec(LABELS)
         self._team_energy = TeamEnergy(node)
         make = node.create_publisher
         names = stack.names
@@ -112,7 +111,7 @@ class Telemetry:
             return
         energy = core.energy(tick, self._team.external_torque(tick.state, self.wrenches))
         self._team_energy.publish(stamp, tick, core.outside.torque(tick.state, self.wrenches))
-        accounts = np.array([energy.storage, energy.rate, energy.supplied, energy.dissipated]).T
+        accounts = rows(seconds(stamp), tick, energy, self.safety)
         for i, codec in enumerate(self._codecs):
             wanted, values = tick.led[i].reference, self._stack.value_slices[i]
             actual = codec.encode(stamp, tick.task.x[values], tick.x_rate[slices[i]])
@@ -120,8 +119,7 @@ class Telemetry:
             self._desired_to[i].publish(
                 codec.encode(stamp, wanted.position, wanted.velocity, wanted.acceleration)
             )
-            account = np.array([seconds(stamp), *accounts[i], self.safety.interventions])
-            self._energy_to[i].publish(self._energy_codec.encode(account))
+            self._energy_to[i].publish(self._energy_codec.encode(accounts[i]))
 
     def condition(self) -> dict[str, object]:
         """Smallest singular value of the stacked Jacobian, tracking errors, shares of the law."""

@@ -190,7 +190,6 @@ class ElbowAngles(Subtask):
 
     axes = ("x",)
     angles = True
-    unit = "rad"
 
     def __init__(self, name: str, robots: tuple[str, ...], arms: Sequence[_Arm]) -> None:
         self.name, self.elements, self._arms = name, robots, tuple(arms)

@@ -12,7 +12,7 @@ from noninteract_ros.schema import key
 from noninteract_ros.subtasks.edges import NO_SUBTASKS
 from noninteract_ros.subtasks.mixing import JointMixing
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
-from noninteract_ros.team.team import PRISMATIC, Team, TeamState
+from noninteract_ros.team.team import Team, TeamState
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,8 @@ class Posture:
             if joint not in able:
                 raise ScenarioError(path, repr(joint), one_of(able, joint))
         places = [able[joint] for joint in self.joints]
-        selection = JointSelection(name, self.joints, places, team.n)
-        numbers = [team.model.getJointId(joint) for joint in self.joints]
-        slides = {team.model.joints[number].shortname() in PRISMATIC for number in numbers}
-        selection.unit = "m, rad" if len(slides) == 2 else "m" if slides == {True} else "rad"
-        return selection
+        units = tuple(team.units[in_v] for _, in_v in places)
+        return JointSelection(name, self.joints, places, units, team.n)
 
 
 class JointSelection(Subtask):
@@ -59,17 +56,29 @@ class JointSelection(Subtask):
         name: Name of the subtask.
         joints: Names of the joints, its elements.
         places: Place of each in the configuration and in the velocity.
+        units: Unit of each.
         n: Number of velocities of the team.
     """
 
     def __init__(
-        self, name: str, joints: tuple[str, ...], places: Sequence[tuple[int, int]], n: int
+        self,
+        name: str,
+        joints: tuple[str, ...],
+        places: Sequence[tuple[int, int]],
+        units: tuple[str, ...],
+        n: int,
     ) -> None:
         self.name, self.elements, self.axes = name, joints, ("x",)
         self._in_q: Array = np.array([in_q for in_q, _ in places])
         self._J = np.eye(n)[[in_v for _, in_v in places]]
         self._J_rate = np.zeros_like(self._J)
         self.mixing = JointMixing(*zip(*places, strict=True))
+        self._units = units
+
+    @property
+    def element_units(self) -> tuple[str, ...]:
+        """Metres where a joint slides."""
+        return self._units
 
     def evaluate(self, state: TeamState) -> SubtaskState:
         """Value and its constant Jacobian."""

@@ -5,6 +5,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from noninteract_ros.arrays import Array
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.mixing import Mixing
@@ -39,7 +41,6 @@ class Subtask(ABC):
         axes: Axes, out of x, y and z, that each element has.
         rotates: Whether each element has a rotation.
         angles: Whether positions are angles [rad]: those a whole turn apart are the same.
-        unit: Unit of the positions.
         frame: Orientation of the team that other subtasks can be seen from, or None; its
             `evaluate` returns one rotation with its differentials, see `parts.Rows`.
         mixing: How it mixes what each robot does, or None; see `mixing`.
@@ -52,7 +53,6 @@ class Subtask(ABC):
     axes: tuple[str, ...]
     rotates: bool = False
     angles: bool = False
-    unit: str = "m"
     frame: Part | None = None
     mixing: Mixing | None = None
 
@@ -61,6 +61,33 @@ class Subtask(ABC):
         """Which numbers of a value are positions and which are quaternions."""
         count = len(self.elements)
         return Layout((len(self.axes),) * count, (self.rotates,) * count, (self.angles,) * count)
+
+    @property
+    def element_units(self) -> tuple[str, ...]:
+        """Unit of the positions of each element."""
+        return ("rad" if self.angles else "m",) * len(self.elements)
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """Unit of each coordinate, shape (p,): errors of rotations are angles."""
+        units = np.full(self.dim, "rad")
+        units[self.layout.rates] = np.repeat(self.element_units, len(self.axes))
+        return tuple(units.tolist())
+
+    def magnitudes(self, e: Array) -> dict[str, Array]:
+        """Sizes of errors e, shape (..., p), by unit, shape (..., k) each.
+
+        Of each element with positions their Euclidean norm, of each rotation its angle.
+        """
+        lengths = e[..., self.layout.rates].reshape(*e.shape[:-1], -1, max(1, len(self.axes)))
+        angles = np.linalg.norm(e[..., self.layout.angular], axis=-1)
+        found = {}
+        if self.axes:
+            norms, units = np.linalg.norm(lengths, axis=-1), np.array(self.element_units)
+            found = {unit: norms[..., units == unit] for unit in ("m", "rad") if unit in units}
+        if self.rotates:
+            found["rad"] = angles  # A subtask that rotates has no positions that are angles.
+        return found
 
     @property
     def dim(self) -> int:

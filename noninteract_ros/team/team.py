@@ -60,6 +60,7 @@ class Team:
         friction: Viscous friction of the joints, shape (n,) [N s/m or N m s/rad]; M, C and g do
             not have it.
         brake_damping: Damping of the robots' own brakes, shape (n,) [N s/m or N m s/rad].
+        units: Unit of each coordinate of a velocity, m or rad, shape (n,).
         prismatic: Whether all joints are, so that nothing but the positions changes.
 
     Raises:
@@ -93,7 +94,13 @@ class Team:
         self._data = self.model.createData()
         self._tools = [self.model.getFrameId(f"{r.name}/{r.tool_frame}") for r in robots]
         self._lower = np.tri(self.n, k=-1, dtype=bool)
-        self.prismatic = all(joint.shortname() in PRISMATIC for joint in self.model.joints[1:])
+        joints = self.model.joints[1:]  # The first is the universe.
+        self.prismatic = all(joint.shortname() in PRISMATIC for joint in joints)
+        self.units = tuple(
+            "m" if joint.shortname() in PRISMATIC else "rad"
+            for joint in joints
+            for _ in range(joint.nv)
+        )
         self._constant: TeamState | None = None
         self._tool_inverses = LastCall(self._compute_tool_inverses)
 

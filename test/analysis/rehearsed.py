@@ -14,6 +14,8 @@ from noninteract_ros.analysis.recording import RunWriter
 from noninteract_ros.analysis.run import Run
 from noninteract_ros.clock import stamp, tick_stamp
 from noninteract_ros.control.energy_account import QUANTITIES
+from noninteract_ros.control.safety_watch import SafetyWatch
+from noninteract_ros.control.subtask_account import LABELS, rows
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.messages import (
     EnergyCodec,
@@ -23,7 +25,6 @@ from noninteract_ros.nodes.messages import (
     to_status,
     to_wrench_stamped,
 )
-from noninteract_ros.nodes.telemetry import ENERGY_LABELS
 from noninteract_ros.operator.narrator import Narrator
 from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario import Scenario
@@ -62,6 +63,7 @@ PAIR: dict[str, Any] = {
     "planner": {"formations": ["pair"], "pair": {"time": 0.0, "value": [1.0, 1.0]}},
 }
 
+Act = Callable[[Rehearsal], Any]
 # Changes a message before it is written, or drops it: topic, time [s], arrays to arrays or None.
 Tamper = Callable[[str, float, list[np.ndarray]], list[np.ndarray] | None]
 
@@ -85,20 +87,31 @@ def record(
     duration: float,
     tamper: Tamper | None = None,
     extra: Callable[[RunWriter], None] | None = None,
+    acts: Mapping[float, Act] | None = None,
 ) -> Run:
-    """Rehearses a scenario for a time [s] and records all topics of the run."""
+    """Rehearses a scenario for a time [s] and records all topics of the run.
+
+    Acts are done at their times [s], as a person does who leads the team from a console.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     text = yaml.safe_dump({"/**": {"ros__parameters": dict(values)}})
     with RunWriter(folder / "run.mcap", text, overwrite=True) as writer:
-        _Recording(writer, Scenario.from_dict(values), tamper).run(duration)
+        _Recording(writer, Scenario.from_dict(values), tamper, acts or {}).run(duration)
         if extra:
             extra(writer)
     return Run.open(folder)
 
 
 class _Recording:
-    def __init__(self, writer: RunWriter, scenario: Scenario, tamper: Tamper | None) -> None:
+    def __init__(
+        self,
+        writer: RunWriter,
+        scenario: Scenario,
+        tamper: Tamper | None,
+        acts: Mapping[float, Act],
+    ) -> None:
         self._writer, self._tamper = writer, tamper
+        self._acts = {round(time * scenario.general.rate): act for time, act in acts.items()}
         self._rehearsal = Rehearsal(scenario)
         self._rate = scenario.general.rate
         self._period = round(self._rate / scenario.general.telemetry_rate)
@@ -107,10 +120,10 @@ class _Recording:
         self._codecs = [
             SubtaskCodec(t.name, t.elements, t.axes, t.rotates) for t in stack.subtasks
         ]
-        self._energy = EnergyCodec(ENERGY_LABELS)
+        self._energy = EnergyCodec(LABELS)
         self._account = EnergyCodec(("time", *QUANTITIES))
         self._measured = 0.0
-        self._interventions = 0
+        self._watch = SafetyWatch(team.joint_names)
         self._narrators = []
         if scenario.haptic:
             device = scenario.build_haptic(stack)
@@ -131,11 +144,13 @@ class _Recording:
         simulation = self._rehearsal.simulation
         for tick in range(round(duration * self._rate)):
             now = tick_stamp(tick, self._rate)
+            if tick in self._acts:
+                self._acts[tick](self._rehearsal)
             q = self._rehearsal.team.joints_from_configuration(simulation.q)
             v, effort = simulation.v, simulation.torque
             wrenches = simulation.external_wrenches()
             result = self._rehearsal.step()
-            self._interventions += result.intervened
+            self._watch.note(now / 1e9, result)
             self._add(
                 "joint_states", JOINTS, now, lambda *a, t=now: self._joints.encode(t, *a),
                 q, v, effort,
@@ -173,6 +188,7 @@ class _Recording:
                 lambda a, t=now: serialize_message(to_wrench_stamped(t, a)), wrench,
             )  # fmt: skip
         energy = self._rehearsal.energy(tick, wrenches)
+        accounts = rows(now / 1e9, tick, energy, self._watch)
         for i, (codec, part) in enumerate(zip(self._codecs, stack.slices, strict=True)):
             wanted, values = tick.led[i].reference, stack.value_slices[i]
             encode = lambda *a, c=codec: c.encode(now, *a)  # noqa: E731
@@ -183,11 +199,7 @@ class _Recording:
                 f"{codec.name}/desired", MOTION, now, encode,
                 wanted.position, wanted.velocity, wanted.acceleration,
             )  # fmt: skip
-            account = np.array(
-                [now / 1e9, energy.storage[i], energy.rate[i], energy.supplied[i],
-                 energy.dissipated[i], self._interventions]
-            )  # fmt: skip
-            self._add(f"{codec.name}/energy", LABELLED, now, self._energy.encode, account)
+            self._add(f"{codec.name}/energy", LABELLED, now, self._energy.encode, accounts[i])
         self._tell_account(now, tick, team.external_torque(tick.state, wrenches))
 
     def _tell_account(self, now: int, tick: Any, external: np.ndarray) -> None:

@@ -25,6 +25,7 @@ def tick(
         law_share=law_share,
         regularity=regularity,
         safety=safety,
+        in_transition=False,
         intervened=law_share < 1.0 or safety.acted or sigma < 1.0 or grip < 1.0,
         account=SimpleNamespace(gated=True, tank=tank),
     )

@@ -18,6 +18,7 @@ from noninteract_ros.subtasks.relative_position import RelativePosition
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.subtasks.team_rotation import TeamRotation
+from noninteract_ros.team.point_mass import PointMass
 from noninteract_ros.team.team import Team, TeamState
 
 STEP = 1e-6
@@ -271,6 +272,23 @@ def test_posture_is_the_joints_that_it_names():
     np.testing.assert_array_equal(found.x, state.q[[8, 4]])
     np.testing.assert_array_equal(found.J @ state.v, state.v[[8, 4]])
     assert not found.J_rate.any()
+
+
+def test_each_coordinate_has_its_unit():
+    """Positions in metres, rotations in radians, joints as they slide or turn."""
+    mixed = Team([spatial_arm("arm"), PointMass(1.0, axes=("x", "y")).build("mass")])
+    slides = Posture("posture", ("mass/y", "arm/joint_2", "mass/x")).build("task", mixed)
+    assert slides.units == ("m", "rad", "m")
+    assert mixed.units == ("rad",) * 6 + ("m",) * 2
+    found = slides.magnitudes(np.array([[-0.3, 0.2, 0.4], [0.0, -0.5, 0.0]]))
+    np.testing.assert_array_equal(found["m"], [[0.3, 0.4], [0.0, 0.0]])
+    np.testing.assert_array_equal(found["rad"], [[0.2], [0.5]])
+    team = spatial_team(2)
+    assert turn().build("lead", team).units == ("rad",) * 3
+    task = lead().build("lead", team)
+    assert task.units == ("m",) * 3 + ("rad",) * 3
+    found = task.magnitudes(np.array([3.0, 0.0, 4.0, 0.0, 0.6, 0.8]))
+    assert {unit: sizes.tolist() for unit, sizes in found.items()} == {"m": [5.0], "rad": [1.0]}
 
 
 @pytest.mark.parametrize(
