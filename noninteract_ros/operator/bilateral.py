@@ -19,9 +19,16 @@ from noninteract_ros.operator.haptic import HapticDevice
 from noninteract_ros.operator.haptic_settings import HapticSettings
 from noninteract_ros.operator.link_settings import LinkSettings
 from noninteract_ros.operator.time_domain_passivity import ObservedDevice, ObservedTeam
+from noninteract_ros.operator.wave_variables import WaveDevice, WaveTeam
 from noninteract_ros.subtasks.layout import Layout
 
 LONGEST_GAP = 0.1  # [s] after a longer one without samples the link is taken up again
+
+ENDS: dict[str, tuple[type[ObservedDevice], type[ObservedTeam]]] = {
+    "none": (ObservedDevice, ObservedTeam),
+    "tdpa": (ObservedDevice, ObservedTeam),
+    "waves": (WaveDevice, WaveTeam),
+}
 
 
 class LinkAccount(NamedTuple):
@@ -162,8 +169,9 @@ class BilateralLink:
     def _new_ends(self, motion: Reference) -> None:
         settings, period = self._settings, 1.0 / self._rate
         limited = self._device.limited
-        self._device_end = ObservedDevice(settings, self._metric, period, limited)
-        self._team_end = ObservedTeam(settings, self._layout, self._metric, period, motion)
+        device, team = ENDS[settings.passivity]
+        self._device_end = device(settings, self._metric, period, limited)
+        self._team_end = team(settings, self._layout, self._metric, period, motion)
 
     def _tick(self, tick: int, feedback: Array) -> Reference | None:
         now, later = tick / self._rate, (tick + 1) / self._rate

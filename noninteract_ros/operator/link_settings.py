@@ -21,10 +21,12 @@ class LinkSettings:
     reordering: bool = key("Whether a packet may overtake another", True)
     seed: int = key("Seed of delays and losses", 0, minimum=0)
     passivity: str = key(
-        "What keeps the connection passive: nothing, or time-domain passivity at both ends",
+        "What keeps the connection passive: nothing, time-domain passivity at both ends, or wave"
+        " variables under the same account",
         "tdpa",
-        choices=("none", "tdpa"),
+        choices=("none", "tdpa", "waves"),
     )
+    impedance: float = key("waves: impedance of the connection [N s/m]", 20.0, positive=True)
     force_scale: float = key(
         "Share of the team's force that the hand is to feel; the link's energies are those of"
         " this share",

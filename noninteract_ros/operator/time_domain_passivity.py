@@ -66,30 +66,28 @@ class ObservedDevice:
         self.port = Port()
         self.doubt = self.surprise = 0.0
         self._newest = Newest()
-        self._feedback: Array = np.zeros_like(metric)
+        self._heard: Array = np.zeros_like(metric)
         self._expected: Array = np.zeros_like(metric)
         self._team_level = settings.reserve
         self._announced = 0.0
         self._number = 0
 
     def resume(self) -> None:
-        """Forgets the feedback, but no energy: the connection is taken up again."""
-        self._feedback = np.zeros_like(self._metric)
+        """Forgets what was heard, but no energy: the connection is taken up again."""
+        self._heard = np.zeros_like(self._metric)
 
     def hear(self, packet: Packet) -> None:
         """Takes a packet of the team's end."""
         self.budget.announce(packet.energy)
         if self._newest.is_newer(packet):
-            (self._feedback,), self._team_level = packet.signals, packet.level
+            (self._heard,), self._team_level = packet.signals, packet.level
 
     def force(self, velocity: Array) -> Array:
         """Force on the hand for the next tick [N; N m], for the velocity at its beginning."""
-        wanted = self._feedback
-        if self._team_level < self._reserve:
-            wanted = wanted - self._filling * self._metric * velocity
         self._expected = self._period * velocity
         limit = max(self.budget.level, 0.0)
-        force = affordable(self._limited(wanted), self._expected, self._metric, self.doubt, limit)
+        wanted = self._limited(self._wanted(velocity))
+        force = affordable(wanted, self._expected, self._metric, self.doubt, limit)
         return self._shrunk(force)
 
     def moved(self, force: Array, way: Array, motion: Reference) -> Packet:
@@ -105,8 +103,18 @@ class ObservedDevice:
         else:
             self._announced += self.budget.keep(-work, self._kept)
         self._number += 1
-        signals = motion.position, motion.velocity
+        signals = motion.position, self._told(force, way, motion)
         return Packet(self._number, signals, self._announced, self.budget.level)
+
+    def _wanted(self, velocity: Array) -> Array:
+        """The force that would be felt if energy were no matter [N; N m]."""
+        if self._team_level >= self._reserve:
+            return self._heard
+        return self._heard - self._filling * self._metric * velocity
+
+    def _told(self, force: Array, way: Array, motion: Reference) -> Array:
+        """What the other end gets to know besides the position."""
+        return motion.velocity
 
     def _shrunk(self, force: Array) -> Array:
         """What the device can do of a force, in its direction: cut in parts it might drive."""
@@ -154,7 +162,7 @@ class ObservedTeam:
         self.budget = Budget(settings.reserve if observed else math.inf, settings.capacity)
         self.port = Port()
         self._newest = Newest()
-        self._now, self._heard = start, (start.position, start.velocity)
+        self.resume(start)
         self._announced = 0.0
         self._number = 0
 
@@ -172,7 +180,8 @@ class ObservedTeam:
     def packet(self, feedback: Array) -> Packet:
         """What the device's end is to know, with the feedback of now [N; N m]."""
         self._number += 1
-        return Packet(self._number, (feedback,), self._announced, self.budget.level)
+        told = self._told(feedback)
+        return Packet(self._number, (told,), self._announced, self.budget.level)
 
     def advance(self, feedback: Array) -> Reference:
         """The team's reference one tick later.
@@ -184,7 +193,7 @@ class ObservedTeam:
         Args:
             feedback: Force that the impedance reflects [N; N m]; its opposite moves the team.
         """
-        wanted = self._smoothed()
+        wanted = self._wanted(feedback)
         force = -feedback
         limit = max(self.budget.level, 0.0) / self._period
         velocity = without_excess(wanted, force, 1.0 / self._metric, limit)
@@ -194,13 +203,17 @@ class ObservedTeam:
         self._now = Reference(self._layout.sum(self._now.position, way), velocity, still)
         return self._now
 
-    def _smoothed(self) -> Array:
+    def _wanted(self, feedback: Array) -> Array:
         """Velocity one tick later of a critically damped follower of what was heard."""
         position, velocity = self._heard
         w, T = self._bandwidth, self._period
         away = self._layout.difference(position, self._now.position)
         pull = w * w * away + 2.0 * w * (velocity - self._now.velocity)
         return self._now.velocity + T * pull
+
+    def _told(self, feedback: Array) -> Array:
+        """What the other end gets to know."""
+        return feedback
 
     def _observe(self, work: float) -> None:
         self.port.give(work)

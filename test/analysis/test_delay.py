@@ -34,6 +34,15 @@ def test_with_passivity_it_settles_and_no_more_than_the_bound_is_drawn(place: st
     assert (force > 3.0) if place == "wall" else (force < 0.1)
 
 
+@pytest.mark.parametrize(("place", "delay"), [("wall", 0.2), ("carrying", 0.1)])
+def test_with_waves_it_settles_too(place: str, delay: float) -> None:
+    """The other layer that a scenario can choose."""
+    kept = run(scenario(place, delay, "waves"))
+    assert kept.restlessness < 0.04
+    assert kept.beyond <= ROUNDING
+    assert kept.behind[-1] < (0.05 if place == "wall" else 0.02)
+
+
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """One place and one delay."""

@@ -60,7 +60,7 @@ class Loop:
         hand: What moves the device.
         network: The two directions.
         period: Tick [s].
-        device: Kind of the device's end.
+        ends: Kinds of the device's end and of the team's.
     """
 
     def __init__(
@@ -70,7 +70,7 @@ class Loop:
         hand: Hand,
         network: tuple,
         period: float = 1e-3,
-        device: type[ObservedDevice] = ObservedDevice,
+        ends: tuple[type[ObservedDevice], type[ObservedTeam]] = (ObservedDevice, ObservedTeam),
     ) -> None:
         metric = np.ones(layout.dim)
         metric[layout.angular] = 0.02
@@ -78,8 +78,8 @@ class Loop:
         self._there, self._back = network
         self._rng = np.random.default_rng(5)
         self._motion = Reference.still(layout.identity, layout)
-        self.device = device(settings, metric, period)
-        self.team = ObservedTeam(settings, layout, metric, period, self._motion)
+        self.device = ends[0](settings, metric, period)
+        self.team = ends[1](settings, layout, metric, period, self._motion)
         self._root = np.sqrt(metric)
         self.force = self.miss = self.debt = self.least = 0.0
 

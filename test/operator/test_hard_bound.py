@@ -2,6 +2,7 @@
 """What the operator can ever get out: the reserve, and one tick's surprise that never adds up."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ from noninteract_ros.operator.channel import Channel
 from noninteract_ros.operator.energy_budget import Packet
 from noninteract_ros.operator.link_settings import LinkSettings
 from noninteract_ros.operator.port import affordable, without_excess
-from noninteract_ros.operator.time_domain_passivity import ObservedDevice
+from noninteract_ros.operator.time_domain_passivity import ObservedDevice, ObservedTeam
+from noninteract_ros.operator.wave_variables import WaveDevice, WaveTeam
 from noninteract_ros.subtasks.layout import Layout
 
 PLANE, POSE = Layout.numbers(2), Layout((3,), (True,))
@@ -76,6 +78,17 @@ def test_nor_does_a_network_of_bursts_that_repeats_and_shuffles(
     holds(Loop(settings, POSE, hand(6), deaf).run(TICKS), settings)
 
 
+@pytest.mark.parametrize("name", ["jitter", "long"])
+@pytest.mark.parametrize("hand", [greedy, jerky, liar], ids=["greedy", "jerky", "liar"])
+def test_waves_are_held_to_the_same_bound(hand: Callable[[int], Hand], name: str) -> None:
+    """Over networks that vary, in which waves alone are not passive."""
+    settings = replace(NETWORKS[name], passivity="waves")
+    ends = WaveDevice, WaveTeam
+    loop = Loop(settings, POSE, hand(6), network(settings), ends=ends).run(TICKS)
+    holds(loop, settings)
+    assert loop.device.port.given + loop.device.port.taken > 0.0
+
+
 class Trusting(ObservedDevice):
     """A device's end that takes the displacement that its velocity foretells for certain."""
 
@@ -88,7 +101,8 @@ def test_a_device_that_trusts_its_velocity_gives_away_more(name: str) -> None:
     """The bound is the doubt's doing: the same hands break it at once without."""
     settings = LinkSettings(delay=0.05, jitter=0.3, loss=0.05, kept=0.0)
     hand = HANDS[name](2)
-    loop = Loop(settings, PLANE, hand, network(settings), device=Trusting).run(TICKS)
+    ends = Trusting, ObservedTeam
+    loop = Loop(settings, PLANE, hand, network(settings), ends=ends).run(TICKS)
     assert loop.least < -(settings.reserve + loop.force * loop.miss)
 
 

@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ends of a connection that exchange wave variables instead of force and velocity.
+
+With an impedance B, diagonal, a force F and a velocity v are the waves
+
+    u = (B v + F) / sqrt(2 B),  w = (B v - F) / sqrt(2 B),  F' v = (u' u - w' w) / 2,
+
+so that delaying u on its way there and w on its way back stores energy and makes none. A delay
+that varies and packets that are lost or held break that. Hence both ends still observe what passes
+their ports and give away no more than was announced (`time_domain_passivity.py`): the waves say
+what is wanted, the account what may be.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.reference import Reference
+from noninteract_ros.operator.link_settings import LinkSettings
+from noninteract_ros.operator.time_domain_passivity import ObservedDevice, ObservedTeam
+
+CATCH_UP = 2.0  # [1/s] at which a distance between the ends goes, which waves alone would keep
+
+
+class WaveDevice(ObservedDevice):
+    """The device's end: takes w, answers a velocity with f = sqrt(2 B) w - B v, tells u."""
+
+    def __init__(self, settings: LinkSettings, metric: Array, *rest: Any) -> None:
+        super().__init__(settings, metric, *rest)
+        self._impedance = settings.impedance * metric
+        self._root = np.sqrt(2.0 * self._impedance)
+
+    def _wanted(self, velocity: Array) -> Array:
+        return self._root * self._heard - self._impedance * velocity
+
+    def _told(self, force: Array, way: Array, motion: Reference) -> Array:
+        """The wave of the force that acted and of the mean velocity of the tick."""
+        return (self._impedance * (way / self._period) - force) / self._root
+
+
+class WaveTeam(ObservedTeam):
+    """The team's end: takes u, answers a force with v = (sqrt(2 B) u - F) / B, tells w.
+
+    The answer is smoothed with the link's bandwidth, since the force follows it at once through
+    the damping. A position that was sent along is caught up with.
+    """
+
+    def __init__(self, settings: LinkSettings, layout: Any, metric: Array, *rest: Any) -> None:
+        self._impedance = settings.impedance * metric
+        self._root = np.sqrt(2.0 * self._impedance)
+        super().__init__(settings, layout, metric, *rest)
+
+    def resume(self, start: Reference) -> None:
+        """Starts from where the device is now, without a wave under way."""
+        self._now, self._heard = start, (start.position, np.zeros_like(start.velocity))
+
+    def _wanted(self, feedback: Array) -> Array:
+        position, wave = self._heard
+        away = self._layout.difference(position, self._now.position)
+        goal = (self._root * wave + feedback) / self._impedance + CATCH_UP * away
+        return self._now.velocity + self._period * self._bandwidth * (goal - self._now.velocity)
+
+    def _told(self, feedback: Array) -> Array:
+        return (self._impedance * self._now.velocity + feedback) / self._root
