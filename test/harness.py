@@ -20,6 +20,7 @@ from rclpy.signals import SignalHandlerOptions
 from repository import ROOT
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
+from waiting import WITNESSES, until
 
 from noninteract_ros.clock import seconds
 from noninteract_ros.nodes.cdr import JointArrays, JointStateCodec
@@ -32,7 +33,6 @@ from noninteract_ros.nodes.robot_team import RobotTeam
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario_file import read_parameters
 
-DEADLINE = 30.0  # [s] for anything to happen
 DEEP = QoSProfile(depth=20000)
 NODES: dict[str, Callable[..., ScenarioNode]] = {
     "robot_team": RobotTeam,
@@ -70,15 +70,6 @@ def flat(values: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]
             yield f"{path}{key}", value
 
 
-def until(done: Callable[[], Any], what: str = "") -> Any:
-    """Polls until something is true; what it was, then."""
-    end = time.monotonic() + DEADLINE
-    while not (value := done()):
-        assert time.monotonic() < end, f"not within {DEADLINE:.0f} s: {what}"
-        time.sleep(0.002)
-    return value
-
-
 class Ear:
     """What a team and its controller say: every message once, by its stamp [ns]."""
 
@@ -87,6 +78,7 @@ class Ear:
         self.states: dict[int, bytes] = {}
         self.commands: dict[int, bytes] = {}
         self.status: dict[str, tuple[int, str, dict[str, str]]] = {}
+        self._told_at: dict[str, float] = {}
         self.now = 0.0
         take_state, take_command = self._keep(self.states), self._keep(self.commands)
         node.create_subscription(JointState, "joint_states", take_state, DEEP, raw=True)
@@ -107,7 +99,16 @@ class Ear:
         for item in message.status:
             values = {pair.key: pair.value for pair in item.values}
             name = item.name.rpartition("/")[2]
+            self._told_at[name] = time.monotonic()
             self.status[name] = (item.level[0], item.message, values)
+
+    def last_words(self) -> list[str]:
+        """What each node said last, and how long ago."""
+        now = time.monotonic()
+        return [
+            f"{name}, {now - self._told_at[name]:.1f} s ago: {text} {values}"
+            for name, (_, text, values) in list(self.status.items())
+        ]
 
     def says(self, node: str, text: str) -> Callable[[], bool]:
         """Whether the newest diagnostics of a node contain a text."""
@@ -150,6 +151,7 @@ class Ros:
         )
         self._executor = EventsExecutor(context=self.context)
         self._nodes: list[Node] = []
+        self._ears: list[Ear] = []
         self._failures: list[Exception] = []
         self._threads: list[threading.Thread] = []
         self.probe = self.node(rclpy.create_node("probe", namespace="team", context=self.context))
@@ -194,7 +196,10 @@ class Ros:
 
     def ear(self, values: Mapping[str, Any]) -> Ear:
         """Listens to a team."""
-        return Ear(self.probe, list(Scenario.from_dict(dict(values)).build_team().joint_names))
+        ear = Ear(self.probe, list(Scenario.from_dict(dict(values)).build_team().joint_names))
+        self._ears.append(ear)
+        WITNESSES.append(ear.last_words)
+        return ear
 
     def call(self, kind: type, service: str, request: Any = None) -> Any:
         """The answer of a service."""
@@ -215,6 +220,8 @@ class Ros:
 
         Without collecting garbage, and then destroying the context, participants linger on.
         """
+        for ear in self._ears:
+            WITNESSES.remove(ear.last_words)
         self.context.try_shutdown()
         for thread in self._threads:
             thread.join(2.0)
@@ -264,7 +271,9 @@ class Stack:
 
     def run_until(self, time_: float) -> None:
         """Waits until the team has come to a time [s]."""
-        until(lambda: self.ear.now >= time_, f"the team at {time_} s, not {self.ear.now} s")
+        until(
+            lambda: self.ear.now >= time_, lambda: f"the team at {time_} s, not {self.ear.now} s"
+        )
 
 
 def go(ros: Ros) -> None:

@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness import DEADLINE, Ear, until
+from harness import Ear
 from repository import ROOT
+from waiting import DEADLINE, WITNESSES, until
 
 from noninteract_ros.nodes.parameter_files import write
 
@@ -31,6 +32,7 @@ class Programs:
             "OPENBLAS_NUM_THREADS": "1",
         }
         self.running: dict[str, subprocess.Popen[str]] = {}
+        WITNESSES.append(self._last_words)
         self._started = 0
 
     def start(self, name: str, values: Mapping[str, Any]) -> subprocess.Popen[str]:
@@ -82,6 +84,13 @@ class Programs:
         """What a program has printed."""
         return self._log(name).read_text()
 
+    def _last_words(self) -> list[str]:
+        """The end of each log, and who has ended."""
+        ended = {name: process.poll() for name, process in self.running.items()}
+        return [
+            f"{name} ended with {status}" for name, status in ended.items() if status is not None
+        ] + [f"{file.name}: {file.read_text()[-500:]}" for file in self._folder.glob("*.log")]
+
     def kill(self, name: str) -> None:
         """Ends a program as `kill -9` does."""
         process = self.running.pop(name)
@@ -92,3 +101,4 @@ class Programs:
         """Ends all programs."""
         for name in list(self.running):
             self.kill(name)
+        WITNESSES.remove(self._last_words)

@@ -16,9 +16,10 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from harness import DEADLINE, Ear, Ros, paper, until
+from harness import Ear, Ros, paper
 from programs import Programs
 from repository import ROOT
+from waiting import DEADLINE, until
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
@@ -138,11 +139,11 @@ class Show:
                 pressed.mouse.down()
             return self.speed() > faster
 
-        until(moving, f"the team moves, not {self.speed()} m/s")
+        until(moving, lambda: f"the team moves, not {self.speed()} m/s")
 
     def rests(self) -> None:
         """Waits until the team is at rest."""
-        until(lambda: self.stays(0.1), f"the team is at rest, not at {self.speed()} m/s")
+        until(lambda: self.stays(0.1), lambda: f"the team is at rest, not at {self.speed()} m/s")
 
     def rest_after(self, release: Callable[[], None]) -> float:
         """Time of the team from a release at a good speed to rest [s], by the states' stamps.

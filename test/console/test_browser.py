@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from harness import Ros, until
+from harness import Ros
 from pages import RawPage
 from programs import Programs
 from show import (
@@ -24,6 +24,7 @@ from show import (
     shoot,
     wait,
 )
+from waiting import until
 from websockets.exceptions import ConnectionClosed
 
 if TYPE_CHECKING:

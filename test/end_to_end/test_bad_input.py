@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, Transform, Twist, TwistStamped, WrenchStamped
-from harness import Ros, Stack, paper, until
+from harness import Ros, Stack, paper
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
+from waiting import until
 
 from noninteract_ros.rehearsal import rehearse
 from noninteract_ros.scenario import Scenario

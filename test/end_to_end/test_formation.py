@@ -2,8 +2,9 @@
 """Thirty robots through the same stack."""
 
 import numpy as np
-from harness import Ros, merged, until
+from harness import Ros, merged
 from repository import ROOT
+from waiting import until
 
 from noninteract_ros.rehearsal import rehearse
 from noninteract_ros.scenario import Scenario

@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from harness import Ear, Ros, paper, until
+from harness import Ear, Ros, paper
 from programs import Programs
+from waiting import until
 
 NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
 RATE = 100.0
@@ -58,14 +59,14 @@ def test_a_killed_program_is_noticed_and_may_return(
     for name in NAMES:
         programs.start(name, values)
     for victim in victims:
-        until(lambda: running(ear), f"all run, before {victim}: {ear.status}")
+        until(lambda: running(ear), f"all run, before {victim} is killed")
         programs.kill(victim)
         ear.status.pop(victim)
         for name, text in NOTICES[victim][lockstep].items():
             until(ear.says(name, text), f"{name} says {text!r} of {victim}")
         SAFE[victim](ear, lockstep)
         programs.start(victim, values)
-    until(lambda: running(ear), f"all run at the end: {ear.status}")
+    until(lambda: running(ear), "all run at the end")
     heard = len(ear.states)
     until(lambda: len(ear.states) > heard + 20, "the team moves on")
 

@@ -3,8 +3,9 @@
 
 import numpy as np
 import pytest
-from harness import Ros, go, paper, until
+from harness import Ros, go, paper
 from programs import Programs
+from waiting import until
 
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.rehearsal import rehearse

@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import DEADLINE, Ear, Ros, go, merged, until
+from harness import Ear, Ros, go, merged
 from programs import Programs
 from repository import ROOT
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from waiting import DEADLINE, until
 
 from noninteract_ros.rehearsal import rehearse
 from noninteract_ros.scenario import Scenario
@@ -28,7 +29,7 @@ def test_the_wiring_changes_nothing_in_lockstep(ros: Ros, programs: Programs) ->
     ear = ros.ear(values)
     programs.start_all(NAMES, values, ear)
     go(ros)
-    until(ear.says("robot_team", "finished"), f"the end: {ear.status}")
+    until(ear.says("robot_team", "finished"), "the end of the run")
     _, q, v, effort = ear.history(ear.states)
     expected = rehearse(Scenario.from_dict(values), 0.5)
     assert len(q) == 501

@@ -3,8 +3,9 @@
 
 import numpy as np
 import pytest
-from harness import Ros, paper, until
+from harness import Ros, paper
 from programs import Programs
+from waiting import until
 
 PLACE = (0.25, -0.15)
 # What a person at a terminal can do: no stamp, no clock of the team, ten times a second.

@@ -2,10 +2,11 @@
 """Authority by topic and by parameter, in mid-motion on the stack."""
 
 import numpy as np
-from harness import Ros, merged, until
+from harness import Ros, merged
 from rcl_interfaces.srv import GetParameters
 from repository import ROOT
 from std_msgs.msg import String
+from waiting import until
 
 from noninteract_ros.scenario_file import read_parameters
 

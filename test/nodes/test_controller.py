@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, WrenchStamped
-from harness import Ros, Stack, paper, until
+from harness import Ros, Stack, paper
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter, parameter_value_to_python
 from sensor_msgs.msg import JointState
 from std_srvs.srv import Trigger
+from waiting import until
 
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.rehearsal import rehearse

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import DEADLINE, Ros, merged, until
+from harness import Ros, merged
 from programs import Programs
 from repository import ROOT
 from std_msgs.msg import String
+from waiting import DEADLINE, until
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.descriptions import LATCHED_QOS

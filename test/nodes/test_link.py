@@ -4,10 +4,11 @@
 from typing import Any
 
 import numpy as np
-from harness import Ros, merged, until
+from harness import Ros, merged
 from pose_link import pose_link
 from repository import ROOT
 from std_msgs.msg import Float64MultiArray
+from waiting import until
 
 from noninteract_ros.operator.bilateral import LinkAccount
 from noninteract_ros.rehearsal import Rehearsal

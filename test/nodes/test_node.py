@@ -10,11 +10,12 @@ from pathlib import Path
 
 import pytest
 import yaml
-from harness import DEADLINE, Ros, flat, paper, until
+from harness import Ros, flat, paper
 from programs import Programs
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.parameter import Parameter, parameter_value_to_python
 from repository import ROOT
+from waiting import DEADLINE, until
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.parameter_files import dump, rewrite

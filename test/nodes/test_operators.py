@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, TwistStamped
-from harness import DEADLINE, Ros, merged, paper, until
+from harness import Ros, merged, paper
 from rclpy.parameter import Parameter
 from repository import ROOT
 from sensor_msgs.msg import Joy
 from std_msgs.msg import Bool
+from waiting import DEADLINE, until
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.joy_operator import JoyOperator

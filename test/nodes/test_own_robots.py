@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import Ros, until
+from harness import Ros
 from own_robots import Hall, HandDriven, drivers, hand_driven, one_topic, own_robots
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
+from waiting import until
 
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.messages import SubtaskCodec

@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 from geometry_msgs.msg import WrenchStamped
-from harness import Ros, go, paper, until
+from harness import Ros, go, paper
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import SetBool, Trigger
+from waiting import until
 
 from noninteract_ros.clock import tick_stamp
 from noninteract_ros.nodes.cdr import JointStateCodec
@@ -47,7 +48,7 @@ class Bench:
         until(lambda: tick_stamp(tick + 1, 1000.0) in self.ear.states, f"state {tick + 1}")
 
     def says(self, text: str) -> None:
-        until(self.ear.says("robot_team", text), f"{text}, not {self.ear.status}")
+        until(self.ear.says("robot_team", text), text)
 
 
 def test_each_command_is_one_tick(ros: Ros) -> None:

@@ -4,9 +4,10 @@
 from typing import Any
 
 import numpy as np
-from harness import Ros, paper, until
+from harness import Ros, paper
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
+from waiting import until
 
 from noninteract_ros.nodes.cdr import JointStateCodec
 from noninteract_ros.nodes.messages import Marker, ParsedReference, SubtaskCodec
@@ -49,7 +50,7 @@ class Bench:
 
     def expect(self, *stamps: tuple[str, int]) -> None:
         """Waits for exactly this to be said, and starts a new list."""
-        until(lambda: len(self.said) >= len(stamps), f"{stamps}, not {self.stamps()}")
+        until(lambda: len(self.said) >= len(stamps), lambda: f"{stamps}, not {self.stamps()}")
         assert self.stamps() == list(stamps)
         self.said.clear()
 

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from harness import Ros, merged, paper, until
+from harness import Ros, merged, paper
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.serialization import deserialize_message
 from repository import ROOT
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
+from waiting import until
 
 from noninteract_ros.nodes.team_energy import LABELS, unsound
 

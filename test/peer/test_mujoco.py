@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import Ros, merged, until
+from harness import Ros, merged
 from programs import Programs
 from repository import ROOT
+from waiting import until
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.rehearsal import History, Rehearsal, rehearse
