@@ -31,7 +31,7 @@ setup(
     maintainer_email="maintainers@example.org",
     python_requires=">=3.11,<3.13",
     packages=find_packages(include=[NAME, f"{NAME}.*"]),
-    package_data={NAME: ["py.typed", "console/static/*"]},
+    package_data={NAME: ["py.typed", "console/static/*", "nodes/udp.xml"]},
     data_files=[
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),

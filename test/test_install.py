@@ -129,6 +129,7 @@ def test_pip_installs_what_ros2_needs(pip_prefix: Path) -> None:
     static = {file.name for file in (ROOT / PACKAGE / "console" / "static").iterdir()}
     page = Path(imported.strip()).parent / "console" / "static"
     assert {file.name for file in page.iterdir()} == static
+    assert (Path(imported.strip()).parent / "nodes" / "udp.xml").is_file()
 
 
 @pytest.mark.parametrize("name", node_programs())

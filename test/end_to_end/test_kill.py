@@ -2,6 +2,7 @@
 """kill -9 of each program: the others notice, stay safe, and go on when it is back."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,6 +36,11 @@ NOTICES = {
 }
 
 
+def shares_memory(process: int) -> bool:
+    """Whether a process speaks over memory that it shares with others."""
+    return "/dev/shm/fastrtps_port" in Path(f"/proc/{process}/maps").read_text()
+
+
 def running(ear: Ear) -> bool:
     return all(ear.status.get(name, (0, ""))[1] == "running" for name in NAMES)
 
@@ -56,10 +62,13 @@ def test_a_killed_program_is_noticed_and_may_return(
         relative={"takeover": "shaped"},
     )
     ear = ros.ear(values)
+    programs.environment.pop("FASTRTPS_DEFAULT_PROFILES_FILE", None)
     for name in NAMES:
         programs.start(name, values)
     for victim in victims:
         until(lambda: running(ear), f"all run, before {victim} is killed")
+        # It might hold a lock there when it is killed, for which the others would wait.
+        assert not shares_memory(programs.running[victim].pid)
         programs.kill(victim)
         ear.status.pop(victim)
         for name, text in NOTICES[victim][lockstep].items():
