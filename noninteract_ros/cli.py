@@ -81,7 +81,13 @@ def demo(
             raise ScenarioError("--in-process", "given", "nothing, with --console")
         return _lead(source, folder, duration, rate_factor, port)
     file = prepare(source, folder.resolve(), duration, rate_factor)
-    interrupted = _run(file, folder.resolve(), in_process)
+    recording = folder / "run.mcap"
+    try:
+        interrupted = _run(file, folder.resolve(), in_process)
+    except NoninteractError:
+        if recording.exists():
+            console.print(f"What was recorded until then lies in {recording}", soft_wrap=True)
+        raise
     if interrupted:
         console.print(f"Interrupted; what was recorded lies in {folder}")
         return 130

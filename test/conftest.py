@@ -18,11 +18,16 @@ DOMAINS = range(10, 60)  # Up to 101, ports stay below the ephemeral ones; other
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compiles the law before any worker or program of a test would, each with its deadline."""
+    """Compiles the law before any worker or program of a test would, each with its deadline.
+
+    Also removes what programs that earlier tests have killed left in shared memory.
+    """
     if not hasattr(session.config, "workerinput"):
         from noninteract_ros.control.compile_ahead import compile_ahead
+        from noninteract_ros.nodes.shared_memory import remove_abandoned
 
         compile_ahead()
+        remove_abandoned()
 
 
 @contextmanager

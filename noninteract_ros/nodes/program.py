@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Start and end of a program: wrong arguments in one line, signals without a trace."""
 
+import ctypes
+import os
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -17,6 +19,9 @@ from rclpy.utilities import remove_ros_args
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.parameter_files import origin_of_key, rewrite
+
+STARTER = "NONINTERACT_ROS_STARTER"  # Process id of whoever ends the programs that it starts.
+PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 
 
 class Runnable(Protocol):
@@ -67,12 +72,26 @@ def until_shutdown(context: rclpy.Context) -> Iterator[None]:
             raise
 
 
+def end_with_starter() -> None:
+    """Asks for SIGINT when the process named by `STARTER` ends: none that it started is left.
+
+    However that one ends, it may have been killed.
+    """
+    starter = os.environ.get(STARTER)
+    if starter is None:
+        return
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
+    if os.getppid() != int(starter):  # It has ended already.
+        signal.raise_signal(signal.SIGINT)
+
+
 def init(arguments: Sequence[str], signals: SignalHandlerOptions) -> None:
     """Starts ROS with a command line whose parameter files are made readable for it.
 
     Raises:
         ScenarioError: An argument or a parameter file is wrong.
     """
+    end_with_starter()
     with TemporaryDirectory() as folder:
         ros_arguments = rewrite(arguments, Path(folder))
         try:

@@ -17,9 +17,11 @@ from rclpy.experimental import EventsExecutor
 from noninteract_ros.nodes.controller import Controller
 from noninteract_ros.nodes.haptic_emulator import HapticEmulator
 from noninteract_ros.nodes.node import NAMESPACE, ScenarioNode, spin
+from noninteract_ros.nodes.program import STARTER
 from noninteract_ros.nodes.recorder import RecorderNode
 from noninteract_ros.nodes.relative_planner import RelativePlanner
 from noninteract_ros.nodes.robot_team import RobotTeam
+from noninteract_ros.nodes.shared_memory import remove_abandoned
 from noninteract_ros.scenario import Scenario
 
 NODES: dict[str, Callable[[], ScenarioNode]] = {
@@ -72,6 +74,7 @@ class Processes:
         self._logs.mkdir(exist_ok=True)
         self._processes: dict[str, subprocess.Popen[bytes]] = {}
         shared = ["--ros-args", "--params-file", str(scenario_file), "-r", f"__ns:=/{namespace}"]
+        remove_abandoned()
         recording = ["-p", f"output:={out / 'run.mcap'}", "-p", "overwrite:=true"]
         if record:
             self._start("recorder", [*shared, *recording])
@@ -89,14 +92,14 @@ class Processes:
                 stdout=log,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,
-                env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
+                env=os.environ | {STARTER: str(os.getpid())},
             )
 
     def problem(self) -> str:
         """Which program has ended, with the last lines of its log."""
         for name, process in self._processes.items():
             if process.poll() is not None:
-                return f"{name} ended with status {process.returncode}: {self._tail(name)}"
+                return f"{name} {_end_of(process.returncode)}: {self._tail(name)}"
         return ""
 
     def _tail(self, name: str) -> str:
@@ -110,6 +113,13 @@ class Processes:
         self._processes.clear()
         if recorder is not None:
             _end([recorder])
+
+
+def _end_of(status: int) -> str:
+    """How a process has ended, in words."""
+    if status >= 0:
+        return f"ended with status {status}"
+    return f"was ended by {signal.Signals(-status).name}"
 
 
 def _end(processes: list[subprocess.Popen[bytes]]) -> None:

@@ -4,8 +4,9 @@
 from typing import Any
 
 import pytest
-from harness import Ros, Stack, paper, until
+from harness import Ros, Stack, paper
 from std_srvs.srv import SetBool, Trigger
+from waiting import until
 
 ERROR, WARN = 2, 1
 

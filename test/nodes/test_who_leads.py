@@ -6,11 +6,12 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from harness import Ros, Stack, flat, go, paper, until
+from harness import Ros, Stack, flat, go, paper
 from pages import RawPage
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from std_msgs.msg import String
+from waiting import until
 
 from noninteract_ros.nodes.operator_console import OperatorConsole
 

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A demo in which somebody dies: clear words, a status, and nobody is left."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from repository import ROOT
+from waiting import DEADLINE, until
+
+from noninteract_ros.analysis.repair import repair
+
+
+def programs_of(process: int) -> dict[str, int]:
+    """Process ids of the programs that a process has started, by name."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
+            command = (folder / "cmdline").read_text().split("\0")
+        except OSError:  # It has ended meanwhile.
+            continue
+        if parent == process and len(command) > 2:
+            found[command[2].rpartition(".")[2]] = int(folder.name)
+    return found
+
+
+def alive(process: int) -> bool:
+    """Whether a process runs; one that has ended and that nobody asked after does not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize("victim", ["controller", "recorder", "demo"])
+def test_whoever_is_killed_nobody_is_left(victim: str, domain: int, tmp_path: Path) -> None:
+    """The demo says who it was, and where the recording lies; without it the programs end."""
+    out = tmp_path / "run"
+    command = ["-m", "noninteract_ros.cli", "demo", "paper", "--rate-factor", "0.1"]
+    environment = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    with (tmp_path / "said").open("w") as said:
+        demo = subprocess.Popen(
+            [sys.executable, *command, "--duration", "1000", "--out", str(out)],
+            cwd=ROOT,
+            env=os.environ | environment | {"COLUMNS": "200"},
+            stdout=said,
+            stderr=said,
+        )
+    told = (tmp_path / "said").read_text
+    recording, programs = out / "run.mcap", dict[str, int]()
+    try:
+        until(lambda: recording.exists() and recording.stat().st_size > 2**18, told)
+        programs = programs_of(demo.pid)
+        assert len(programs) == 5, programs
+        os.kill({"demo": demo.pid, **programs}[victim], signal.SIGKILL)
+        status = demo.wait(DEADLINE)
+        until(lambda: not any(map(alive, programs.values())), lambda: f"the end of {programs}")
+    finally:
+        demo.kill()
+        for process in filter(alive, programs.values()):
+            os.kill(process, signal.SIGKILL)
+    if victim == "demo":
+        assert repair(recording).intact
+        return
+    assert status == 1
+    assert re.search(f"noninteract: {victim} was ended by SIGKILL", told()), told()
+    assert f"recorded until then lies in {recording}" in told()
+    assert repair(recording).intact == (victim != "recorder")
