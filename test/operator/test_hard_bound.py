@@ -19,7 +19,7 @@ from noninteract_ros.operator.wave_variables import WaveDevice, WaveTeam
 from noninteract_ros.subtasks.layout import Layout
 
 PLANE, POSE = Layout.numbers(2), Layout((3,), (True,))
-TICKS = 3000
+TICKS = 2000
 ROUNDING = 1e-9  # [J]
 HANDS: dict[str, Callable[[int], Hand]] = {
     "tremor at 10 Hz": lambda dim: tremor(dim, 10.0),
