@@ -19,6 +19,7 @@ from noninteract_ros.nodes.messages import POSE, check_rotations, flat
 from noninteract_ros.nodes.operator_node import OperatorNode
 from noninteract_ros.nodes.program import run_program
 from noninteract_ros.operator.input_settings import TrackerSettings
+from noninteract_ros.operator.input_shaping import DeadMan
 from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.layout import Layout
 
@@ -26,7 +27,8 @@ from noninteract_ros.subtasks.layout import Layout
 class PoseOperator(OperatorNode):
     """Leads while the clutch is held: the subtask moves from where it is as the device does.
 
-    The device's silence lets go, and so does a pose that has jumped.
+    The device's silence lets go, and so does a pose that has jumped. A clutch on a Joy lets go by
+    its silence, too, for drivers repeat what is pressed; a Bool holds until it is told otherwise.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -35,7 +37,7 @@ class PoseOperator(OperatorNode):
         self._largest_jump = settings.largest_jump
         self._mounting = _mounting(settings)
         self._button = settings.clutch_button
-        self._clutch = False
+        self._clutch, self._pressed = False, DeadMan(self.settings.hold_timeout)
         self._pose: Array | None = None
         self.subscribe(PoseStamped, settings.pose_topic, self._on_pose)
         if settings.clutch_topic:
@@ -47,7 +49,8 @@ class PoseOperator(OperatorNode):
         self._clutch = message.data
 
     def _on_joy(self, message: Joy) -> None:
-        self._clutch = len(message.buttons) > self._button and bool(message.buttons[self._button])
+        there = len(message.buttons) > self._button
+        self._pressed.note(time.monotonic(), there and bool(message.buttons[self._button]))
 
     def _on_pose(self, message: PoseStamped) -> None:
         pose = flat(message.pose.position, message.pose.orientation)
@@ -62,7 +65,7 @@ class PoseOperator(OperatorNode):
         )
         before, self._pose = self._pose, pose
         now = time.monotonic()
-        held = self._clutch
+        held = self._clutch or self._pressed.held(now)
         if before is not None and self.dead_man.held(now):
             way = float(np.linalg.norm(pose[:3] - before[:3]))
             if way > self._largest_jump:

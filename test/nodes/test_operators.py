@@ -224,6 +224,37 @@ def test_a_tracker_that_jumps_lets_go(ros: Ros) -> None:
     assert np.abs(bench.place() - start).max() < 5e-3
 
 
+def test_a_button_is_a_clutch_whose_silence_lets_go(ros: Ros) -> None:
+    """Autorepeat at 20 Hz; a gamepad that is cut off while poses go on holds nothing any more."""
+    bench = Bench(ros, PoseOperator, tracker={"joy_topic": "/joy", "clutch_button": 2})
+    driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
+    gamepad = ros.probe.create_publisher(Joy, "/joy", 10)
+    ros.matched(driver, gamepad)
+    start, moved = bench.place(), 0.0
+
+    def held(step: float, done: Callable[[], Any]) -> None:
+        """As a hand moves, at 0.5 m/s at most; the button is told of with every fifth pose."""
+        nonlocal moved
+        for k in range(round(DEADLINE / 0.01)):
+            if done():
+                return
+            moved = min(moved + step, 0.06)
+            driver.publish(pose(3.0 + moved, 3.0))
+            if k % 5 == 0:
+                gamepad.publish(joy(REST, (2,)))
+            time.sleep(0.01)
+        raise AssertionError("nothing came of it")
+
+    held(0.0, lambda: len(bench.said) > 10)
+    held(5e-3, lambda: abs(bench.place()[0] - start[0] - 0.06) < 3e-3)
+    bench.publish(driver, pose(3.06, 3.0), 100.0, lambda: bench.node._words == 0)
+    count = len(bench.said)
+    gamepad.publish(joy(REST, (2,)))  # Back, and still pressed: it has to be pressed anew.
+    bench.publish(driver, pose(3.06, 3.0), 100.0, bench.ear.renewed("pose_operator"))
+    assert len(bench.said) <= count + 1
+    assert not bench.node.input.clutched
+
+
 class Keys:
     """A keyboard program on a terminal of its own."""
 
