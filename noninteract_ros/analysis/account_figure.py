@@ -5,6 +5,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from noninteract_ros.analysis.marks import mark_transitions
 from noninteract_ros.analysis.passivity import observe, surroundings_work
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.style import COLOURS, new_figure, styled
@@ -29,12 +30,16 @@ def account_figure(recorded: Recorded) -> Figure:
     _draw(powers, found.t, ("wanted by decoupling $P$", found.demand), first=2)
     # Under a law without gates there is nothing to show.
     sigma, grip = (np.where(found.gated, gate, np.nan) for gate in (found.sigma, found.grip))
-    _draw(gates, found.t, ("$\\sigma$", sigma), ("$\\nu$", grip))
+    _draw(gates, found.t, ("$\\sigma$, of decoupling", sigma), ("$\\nu$, of impedance", grip))
     gates.lines[1].set_linestyle((0, (4, 3)))  # They often lie on each other.
     gates.set_ylim(-ROOM, 1.0 + ROOM)
     _draw(sums, found.t, ("received", _whole(found)), ("residual", found.residual))
     seen = surroundings_work(observe(recorded))
     sums.plot(*seen, color="black", linestyle=(0, (1, 2)), label="received, as observed")
+    if not found.gated.any():
+        note = f"law {recorded.scenario.general.law} has no gates"
+        gates.text(0.5, 0.5, note, transform=gates.transAxes, ha="center", va="center")
+    mark_transitions(recorded, (gates, energies, powers, sums))
     labels = ("energy [J]", "power [W]", "gate", "energy [J]")
     for axes, label in zip((energies, powers, gates, sums), labels, strict=True):
         axes.set_ylabel(label)

@@ -36,7 +36,7 @@ def limits_figure(recorded: Recorded) -> Figure:
     values.set_ylim(bottom=0.0)
     values.set_ylabel("smallest\nsingular value")
     values.set_xlabel("time [s]")
-    values.margins(x=0.0)
+    values.set_xlim(t[0], t[-1])
     figure.align_ylabels([shares, values])
     return figure
 

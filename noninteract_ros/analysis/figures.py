@@ -13,6 +13,7 @@ from noninteract_ros.analysis.arm_figures import limits_figure
 from noninteract_ros.analysis.energy_account import Account, account
 from noninteract_ros.analysis.link_figures import link_figure
 from noninteract_ros.analysis.link_metrics import link_account
+from noninteract_ros.analysis.marks import mark_leaders, mark_transitions, transitions
 from noninteract_ros.analysis.paths import paths_figure
 from noninteract_ros.analysis.recorded import Recorded, Tracking, select
 from noninteract_ros.analysis.rendering import Film, motion_figure, save_animation
@@ -90,6 +91,8 @@ def tracking_figure(recorded: Recorded, subtask: str) -> Figure:
         axes.margins(x=0.0)
     if task.rotates:
         _draw_angles(rows[-1], tracking, task)
+    mark_transitions(recorded, rows)
+    mark_leaders(recorded, subtask, rows)
     rows[-1].set_xlabel("time [s]")
     figure.align_ylabels(rows)
     # Beside the curves there is no telling where room is; above the axes there always is.
@@ -151,13 +154,16 @@ def _draw_many(
 def storage_figure(recorded: Recorded) -> Figure:
     """Storage functions (up) and their rates (down), each from its subtask's start on.
 
+    In a run that somebody stopped or changed in between they are shown over the run's own time.
+
     Raises:
         RecordingError: The recording lacks an energy.
     """
-    names = recorded.stack.names
+    names, led_by_hand = recorded.stack.names, bool(transitions(recorded))
     figure, (storages, rates) = new_figure(4.2, 2)
     for number, name in enumerate(names):
         t, found = _aligned(recorded, name)
+        t = found.t if led_by_hand else t
         for axes, values, symbol in (
             (storages, found.storage, "S"),
             (rates, found.rate, r"\dot{S}"),
@@ -172,15 +178,13 @@ def storage_figure(recorded: Recorded) -> Figure:
     storages.set_ylabel("storage [J]")
     rates.set_ylabel("rate of storage [W]")
     figure.align_ylabels([storages, rates])
-    rates.set_xlabel("time since the subtask's start [s]")
+    rates.set_xlabel("time [s]" if led_by_hand else "time since the subtask's start [s]")
     for axes in (storages, rates):
         axes.axhline(0.0, color="black", linewidth=0.6, zorder=1)
-        if len(names) <= FEW:
-            axes.legend(loc="best")
-    if len(names) > FEW:
-        handles, labels = storages.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=3)
-    storages.set_xlim(0.0, _shown(recorded))
+    mark_transitions(recorded, (storages, rates))
+    handles, labels = storages.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper right", ncols=3)
+    storages.set_xlim(0.0, recorded.t[-1] if led_by_hand else _shown(recorded))
     return figure
 
 

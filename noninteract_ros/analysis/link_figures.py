@@ -34,7 +34,7 @@ def link_figure(recorded: Recorded, account: LabelledSeries) -> Figure:
     _finish(balance, "balance [J]")
     _finish(budgets, "budget [J]")
     budgets.set_xlabel("time [s]")
-    budgets.margins(x=0.0)
+    budgets.set_xlim(t[0], t[-1])
     figure.align_ylabels([ports, balance, budgets])
     return figure
 

@@ -39,8 +39,7 @@ def paths_figure(recorded: Recorded) -> Figure:
     axes.set_ylabel(f"{used[-1] if len(used) < 2 else used[1]} [m]")
     _draw_paths(axes, recorded, plan)
     _draw_formations(axes, recorded, t, plan)
-    if len(recorded.team.names) <= FEW:
-        figure.legend(loc="outside upper right", ncols=3)
+    figure.legend(loc="outside upper right", ncols=3 if len(recorded.team.names) <= FEW else 6)
     return figure
 
 
@@ -77,7 +76,10 @@ def _draw_formations(axes: Axes, recorded: Recorded, t: Array, plan: Array) -> N
         shade = f"{0.7 * (1.0 - step / max(1, len(times) - 1)):.3f}"
         for first, second in edges:
             axes.plot(*plan[row, [first, second]].T, color=shade, linewidth=0.9, zorder=3)
-        axes.plot(*plan[row].T, "o", color=shade, markersize=4.5 if few else 2.5, zorder=4)
+        # Many robots have no room for words between them.
+        label = None if few else f"{time:g} s"
+        size = 4.5 if few else 2.5
+        axes.plot(*plan[row].T, "o", color=shade, markersize=size, zorder=4, label=label)
         middle = plan[row].mean(axis=0)
         apart = APART * np.ptp(plan[:, :, 0])
         if few and all(np.linalg.norm(middle - other) > apart for other in labelled):

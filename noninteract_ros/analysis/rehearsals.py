@@ -8,6 +8,7 @@ import numpy as np
 
 from noninteract_ros.analysis.processes import in_processes
 from noninteract_ros.arrays import Array
+from noninteract_ros.control.subtask_input import InputSettings
 from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario import Scenario
 
@@ -70,7 +71,18 @@ def starts(scenario: Scenario) -> dict[str, float]:
     human = scenario.haptic.start_time if scenario.haptic else 0.0
     # Where there are several formations the team mostly starts in the first.
     changed = formations[:2][-1]
-    return {"human": human, "autonomy": min(changed, max(human, formations[0]))}
+    found = {"human": human, "autonomy": min(changed, max(human, formations[0]))}
+    for source, subtask in owned_subtasks(scenario).items():
+        found[source] = max(found[source], _takes(scenario.subtasks[subtask].input, source))
+    return found
+
+
+def _takes(settings: InputSettings, source: str) -> float:
+    """When a source first leads a subtask by plan [s]; 0 where that is not planned."""
+    if settings.authority == source:
+        return 0.0
+    plan = zip(settings.hand_over_times, settings.hand_over_to, strict=True)
+    return min((time for time, taker in plan if taker == source), default=0.0)
 
 
 def owned_subtasks(scenario: Scenario) -> dict[str, str]:

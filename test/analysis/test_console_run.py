@@ -11,8 +11,11 @@ import pytest
 from rehearsed import Act, Tamper, record, scenario_values
 
 from noninteract_ros.analysis import intervals
+from noninteract_ros.analysis.account_figure import account_figure
 from noninteract_ros.analysis.checks import Check
 from noninteract_ros.analysis.energy_account import account
+from noninteract_ros.analysis.figures import storage_figure, tracking_figure
+from noninteract_ros.analysis.marks import transitions
 from noninteract_ros.analysis.metrics import measure
 from noninteract_ros.analysis.passivity import observe
 from noninteract_ros.analysis.recorded import Recorded
@@ -164,6 +167,35 @@ def test_who_leads_is_told(session: tuple[Recorded, dict[str, Check]]) -> None:
     assert AUTHORITIES[leader[0.4]] == "human"
     assert AUTHORITIES[leader[0.72]] == "hold"
     assert recorded.start("cooperative") == pytest.approx(0.1, abs=0.005)
+
+
+def test_figures_show_who_led_and_when_the_law_was_not_alone(
+    session: tuple[Recorded, dict[str, Check]],
+) -> None:
+    """A shade for the stop, each change and the new start; words for whoever leads for long."""
+    recorded, _ = session
+    spans = transitions(recorded)
+    starts = [0.8, 1.5, 1.8]  # The change at 1.2 s begins where the resume has faded.
+    assert all(any(abs(first - start) < 0.02 for first, _ in spans) for start in starts)
+    for figure in (tracking_figure(recorded, "relative"), storage_figure(recorded)):
+        assert [len(axes.patches) for axes in figure.axes] == [len(spans)] * 2
+        (legend,) = figure.legends
+        assert legend.get_texts()[-1].get_text() == "stop or change"
+    assert storage_figure(recorded).axes[1].get_xlabel() == "time [s]"
+    assert account_figure(recorded).axes[2].get_legend() is not None
+
+
+def test_a_hand_over_is_written_above_the_curves(tmp_path: Path) -> None:
+    """Dotted lines where the next one takes over, and who it is."""
+    values = values_of("paper") | {"planner": read_parameters(find_scenario("paper"))["planner"]}
+    acts = {
+        0.4: give("relative", "human"),
+        **{0.31 + 0.1 * k: lead("relative", 0.1, 0.0) for k in range(1, 10)},
+    }
+    recorded = Recorded(record(tmp_path, values, 1.2, acts=acts))
+    figure = tracking_figure(recorded, "relative")
+    assert {text.get_text() for text in figure.axes[0].texts} == {"autonomy", "human"}
+    assert not list(tracking_figure(recorded, "cooperative").axes[0].texts)
 
 
 def test_energy_that_nobody_supplied_is_still_found(tmp_path: Path) -> None:

@@ -110,7 +110,10 @@ def test_thirty_robots_stay_legible(tmp_path: Path) -> None:
     figure = tracking_figure(recorded, "relative")
     assert [len(axes.lines) for axes in figure.axes] == [2 * 29] * 2
     assert [sorted(found) for found in curves(figure)] == [["actual, 29 elements", "desired"]] * 2
-    assert not paths_figure(recorded).legends
+    (legend,) = paths_figure(recorded).legends  # Times of the formations, no names.
+    words = [text.get_text() for text in legend.get_texts()]
+    assert len(words) < 7
+    assert all(word.endswith(" s") for word in words)
 
 
 @pytest.mark.parametrize(("axes", "expected"), [(["z"], "time [s]"), (["x", "z"], "x [m]")])

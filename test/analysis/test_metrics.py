@@ -13,6 +13,7 @@ from noninteract_ros.analysis.checks import Check
 from noninteract_ros.analysis.metrics import Findings, measure
 from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.recording import RunWriter
+from noninteract_ros.analysis.rehearsals import starts
 from noninteract_ros.errors import RecordingError
 from noninteract_ros.nodes.messages import (
     Level,
@@ -21,6 +22,7 @@ from noninteract_ros.nodes.messages import (
     to_status,
     to_wrench_stamped,
 )
+from noninteract_ros.scenario_file import find_scenario, load_scenario
 
 
 def findings(folder: Path, tamper: Tamper | None = None, **changes: object) -> Findings:
@@ -282,3 +284,9 @@ def test_a_recording_that_cannot_be_analysed_says_why(tmp_path: Path) -> None:
 
         with pytest.raises(RecordingError, match=reason):
             Recorded(Run.open(tmp_path))
+
+
+def test_rehearsals_last_until_a_source_has_taken_over() -> None:
+    """Where the human leads from a planned hand-over on, what they move shows only then."""
+    scenario = load_scenario(find_scenario("hand_over"))
+    assert starts(scenario) == {"human": 2.5, "autonomy": 0.0}
