@@ -148,16 +148,16 @@ def report(
 
 
 def _report(run: Path, out: Path | None, compare_laws: bool = False) -> int:
-    from noninteract_ros.analysis.report import tables, write_report
+    from noninteract_ros.analysis.report import summary, tables, write_report
 
     with console.status("computing metrics, drawing figures"):
         made = write_report(run, out, compare=compare_laws)
     for table in tables(made):
         console.print(table)
     console.print("Files:", *(f"\n  {file}" for file in made.files))
-    failed = [check.name for check in made.checks if check.passed is False]
-    if failed:
-        console.print(f"[bold red]Failed:[/] {', '.join(failed)}")
+    for reason in made.missing:
+        console.print(f"Not drawn: {reason}", markup=False)
+    console.print(summary(made))
     return 0 if made.passed else 1
 
 

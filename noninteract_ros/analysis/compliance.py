@@ -45,7 +45,7 @@ class Errors:
         rate: Ticks per second [Hz].
         position: Largest error of a coordinate of each subtask that has positions [m].
         angle: Largest error of each subtask that has rotations or angles [rad].
-        speed: Largest speed of the desired motions [m/s].
+        speed: Largest speed of an element of the desired motions [m/s].
         turning: Largest angular speed of the desired motions [rad/s].
         damping_per_tick: Largest eigenvalue of inertia^-1 D at the start, times the tick; a loop
             that is sampled is stable below about 2.
@@ -136,12 +136,11 @@ def measure_law(scenario: Scenario, law: str, rate: float, duration: float) -> E
 
 def _row(rehearsal: Rehearsal, tick: Tick) -> tuple[Array, tuple[float, float], bool]:
     """Errors, largest desired speeds, and whether anything but the law acted, at a tick."""
-    speed = turning = 0.0
+    speed, turning, none = 0.0, 0.0, np.zeros(1)
     for task, led in zip(rehearsal.stack.subtasks, tick.led, strict=True):
-        velocity, layout = led.reference.velocity, task.layout
-        speed = max(speed, float(np.linalg.norm(velocity[layout.rates])))
-        angular = np.linalg.norm(velocity[layout.angular], axis=1)
-        turning = max(turning, float(angular.max(initial=0.0)))
+        sizes = task.magnitudes(led.reference.velocity)
+        speed = max(speed, float(sizes.get("m", none).max()))
+        turning = max(turning, float(sizes.get("rad", none).max()))
     return tick.error.e, (speed, turning), tick.intervened
 
 

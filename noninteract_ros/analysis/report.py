@@ -16,10 +16,10 @@ from noninteract_ros.analysis.recorded import Recorded
 from noninteract_ros.analysis.rehearsals import SMALL
 from noninteract_ros.analysis.run import Run
 from noninteract_ros.analysis.storage_order import storage_orders
-from noninteract_ros.analysis.tables import tables
+from noninteract_ros.analysis.tables import summary, tables
 from noninteract_ros.errors import RecordingError
 
-__all__ = ["Report", "tables", "write_report"]
+__all__ = ["Report", "summary", "tables", "write_report"]
 
 METRICS_NAME = "metrics.json"
 

@@ -26,6 +26,18 @@ def tables(report: "Report") -> list[Table]:
     ]
 
 
+def summary(report: "Report") -> str:
+    """How many checks passed, failed and do not apply, in one sentence with markup."""
+    verdicts = [check.passed for check in report.checks]
+    text = f"{verdicts.count(True)} of {len(verdicts)} checks passed"
+    if open_ones := verdicts.count(None):
+        text += f", {open_ones} do not apply"
+    if report.failures:
+        names = ", ".join(check.name for check in report.failures)
+        text += f"; [bold red]failed:[/] {names}"
+    return text
+
+
 def checks_table(checks: tuple[Check, ...]) -> Table:
     """A row for each check; what does not apply refers to a note that says why."""
     titles = ("check", "found", "bound", "unit", "")
@@ -95,7 +107,7 @@ def laws_table(laws: dict[str, Any]) -> Table:
         if name in laws["rows"][0][f"max_error_{unit}"]
     ]
     titles = (rf"{name} \[{unit}]" for name, unit in kinds)
-    table = Table("largest error under", r"rate \[Hz]", *titles, "D/M")
+    table = Table("largest error under", r"rate \[Hz]", *titles, "D/M", caption_justify="left")
     for row in laws["rows"]:
         cells = (_number(row[f"max_error_{unit}"][name]) for name, unit in kinds)
         law = row["law"] + (" (limits acted)" if row["limits_acted"] else "")

@@ -11,7 +11,7 @@ from rich.console import Console
 
 from noninteract_ros import cli
 from noninteract_ros.analysis.recording import RunWriter
-from noninteract_ros.analysis.report import tables, write_report
+from noninteract_ros.analysis.report import summary, tables, write_report
 from noninteract_ros.errors import RecordingError
 
 
@@ -36,6 +36,8 @@ def test_a_report_holds_metrics_checks_and_figures(tmp_path: Path) -> None:
     assert [check["name"] for check in stored["checks"]] == [c.name for c in report.checks]
     assert stored["closed_form"]["relative"]["max_deviation_m"] < 2e-3
     assert set(stored["comparison"]["moved"]) == {"energy_gated", "natural"}
+    passed, count = sum(check.passed is True for check in report.checks), len(report.checks)
+    assert summary(report) == f"{passed} of {count} checks passed, {count - passed} do not apply"
     text = shown(report)
     for word in ("closed_form.relative", "passed", "n/a", "max error", "natural"):
         assert word in text
@@ -68,6 +70,7 @@ def test_a_broken_run_does_not_pass(tmp_path: Path) -> None:
     assert "Infinity" not in text
     assert json.loads(text)["passed"] is False
     assert "FAILED" in shown(report)
+    assert "failed:[/] complete.numbers_not_finite, reproduction" in summary(report)
 
 
 def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
