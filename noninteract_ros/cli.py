@@ -5,7 +5,8 @@ import json
 import os
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -81,13 +82,8 @@ def demo(
             raise ScenarioError("--in-process", "given", "nothing, with --console")
         return _lead(source, folder, duration, rate_factor, port)
     file = prepare(source, folder.resolve(), duration, rate_factor)
-    recording = folder / "run.mcap"
-    try:
+    with _keeping(folder):
         interrupted = _run(file, folder.resolve(), in_process)
-    except NoninteractError:
-        if recording.exists():
-            console.print(f"What was recorded until then lies in {recording}", soft_wrap=True)
-        raise
     if interrupted:
         console.print(f"Interrupted; what was recorded lies in {folder}")
         return 130
@@ -104,10 +100,22 @@ def _lead(
 
     values = for_console(read_parameters(source), port)
     file = prepare(source, folder.resolve(), duration, rate_factor, values)
-    with suppress(KeyboardInterrupt):
+    with suppress(KeyboardInterrupt), _keeping(folder):
         run_with_console(file, folder.resolve(), partial(console.print, soft_wrap=True))
     console.print(f"Recorded in {folder}; draw it with: noninteract report {folder}")
     return 0
+
+
+@contextmanager
+def _keeping(folder: Path) -> Iterator[None]:
+    """Says where the recording of a run that fails lies."""
+    try:
+        yield
+    except NoninteractError:
+        recording = folder / "run.mcap"
+        if recording.exists():
+            console.print(f"What was recorded until then lies in {recording}", soft_wrap=True)
+        raise
 
 
 def _run(file: Path, folder: Path, in_process: bool) -> bool:
