@@ -79,7 +79,7 @@ class Controller(ScenarioNode):
         self.create_service(Trigger, "~/refill", self._on_refill)
         if self.lockstep:
             self.every(WATCH_PERIOD, self._answer_if_complete)
-        self.every(WATCH_PERIOD, self._tell_who_leads)
+        self.every(WATCH_PERIOD, self._live.follow_authority)
 
     def _take_input(
         self, topic: str, subtask: str, source: str, parsed: tuple[int, Motion | Force | None]
@@ -92,11 +92,6 @@ class Controller(ScenarioNode):
         if self.lockstep:
             self._work_off()
             self._answer_if_complete()
-
-    def _tell_who_leads(self) -> None:
-        """Has the parameters follow hand-overs by plan, once all that was asked for is done."""
-        if not self._queue:
-            self._live.follow_authority()
 
     def _work_off(self) -> None:
         while self._queue:

@@ -36,6 +36,7 @@ class LiveParameters:
         self._node, self._core, self._post, self._changed = node, core, post, changed
         self._authorities = {name: item.authority for name, item in core.inputs.items()}
         self._following = False
+        self._asked = self._done = 0  # Changes; each counted by one thread alone.
         self._rules = {
             name: (hint, rule) for name, hint, rule, _ in node.scenario.parameters() if rule.live
         }
@@ -74,11 +75,14 @@ class LiveParameters:
         if tank != self._tank:
             changes.append(partial(setattr, self._core.gate, "settings", tank))
         self._impedances, self._tank = impedances, tank
-        self._post(partial(_run_all, changes))
+        self._asked += 1
+        self._post(partial(self._run_all, changes))
         return SetParametersResult(successful=True)
 
     def follow_authority(self) -> None:
         """Has the parameters tell who leads, where it is not who was last asked for."""
+        if self._asked != self._done:
+            return
         for name, item in self._core.inputs.items():
             leads = item.authority
             if self._authorities[name] == leads:
@@ -107,8 +111,8 @@ class LiveParameters:
         else:
             impedances[subtask] = replace(impedances[subtask], **{item: checked})
 
-
-def _run_all(changes: list[Callable[[], None]]) -> None:
-    """Changes that were asked for together begin at the same tick."""
-    for change in changes:
-        change()
+    def _run_all(self, changes: list[Callable[[], None]]) -> None:
+        """Changes that were asked for together begin at the same tick."""
+        for change in changes:
+            change()
+        self._done += 1
