@@ -46,9 +46,8 @@ def running(ear: Ear) -> bool:
 
 
 @pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "wall"])
-@pytest.mark.parametrize("victims", [NAMES[:2], NAMES[2:]], ids=["core", "sources"])
 def test_a_killed_program_is_noticed_and_may_return(
-    ros: Ros, programs: Programs, lockstep: bool, victims: list[str]
+    ros: Ros, programs: Programs, lockstep: bool
 ) -> None:
     """Each neighbour says so, the team is at rest or led on, and all run on with the new one."""
     values = paper(
@@ -65,7 +64,7 @@ def test_a_killed_program_is_noticed_and_may_return(
     programs.environment.pop("FASTRTPS_DEFAULT_PROFILES_FILE", None)
     for name in NAMES:
         programs.start(name, values)
-    for victim in victims:
+    for victim in NAMES:
         until(lambda: running(ear), f"all run, before {victim} is killed")
         # It might hold a lock there when it is killed, for which the others would wait.
         assert not shares_memory(programs.running[victim].pid)

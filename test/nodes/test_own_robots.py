@@ -116,7 +116,7 @@ def test_states_of_different_times_cost_what_the_prediction_does(
     floor, _ = run(halls(**changes), 0)
     assert floor < 1e-5
     errors = []
-    for age in (1, 2, 4, 6):  # 0.5, 1, 2 and 3 ms
+    for age in (1, 3, 6):  # 0.5, 1.5 and 3 ms
         error, acceleration = run(halls(**changes), age)
         allowed = 90.0 / 900.0 * acceleration * age * 0.5e-3
         if prediction == "velocity":
@@ -125,7 +125,7 @@ def test_states_of_different_times_cost_what_the_prediction_does(
             assert error < 0.02 * allowed + floor
         errors.append(error)
     if prediction == "velocity":
-        np.testing.assert_allclose(np.array(errors) / errors[0], [1.0, 2.0, 4.0, 6.0], rtol=0.03)
+        np.testing.assert_allclose(np.array(errors) / errors[0], [1.0, 3.0, 6.0], rtol=0.03)
 
 
 def test_a_late_robot_holds_the_whole_team_until_it_is_back(halls: Any) -> None:
