@@ -13,8 +13,10 @@ from itertools import pairwise
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from noninteract_ros.analysis import intervals
 from noninteract_ros.analysis.checks import Check, at_most, not_applicable
-from noninteract_ros.analysis.influences import Influence
+from noninteract_ros.analysis.energy_account import account
+from noninteract_ros.analysis.influences import CHANGE, MOTION, Influence
 from noninteract_ros.analysis.recorded import FRICTION, Motion, Recorded, select
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.decoupling import TaskDynamics, task_dynamics
@@ -211,7 +213,11 @@ def closed_form_check(recorded: Recorded, subtask: str, found: ClosedForm | str)
 
 def _require(recorded: Recorded, subtask: str, outside: list[Influence]) -> None:
     scenario, law = recorded.scenario, recorded.scenario.general.law
-    foreign = [item.text for item in outside if item.subtask in ("", subtask)]
+    shaped = scenario.subtasks[subtask].input.takeover == "shaped"
+    # A motion that is shaped is known as it was told, and changes are left out while they last.
+    known = (MOTION, CHANGE) if shaped else ()
+    concerned = [item for item in outside if item.subtask in ("", subtask)]
+    foreign = [item.text for item in concerned if item.kind not in known]
     on_tools = all(push.on_tool(recorded.team) for push in scenario.pushes.values())
     changed = recorded.interventions()
     reasons = {
@@ -233,12 +239,16 @@ def _led_motions(recorded: Recorded, subtask: str) -> Iterator[Motion]:
     """The desired motion, in pieces without a jump.
 
     A direct take-over follows its references as they come; what is shaped is known from the
-    desired motion that the controller tells, from the first tick on.
+    desired motion that the controller tells, from the first tick on, wherever a law that decouples
+    alone made the torques.
     """
     settings = recorded.scenario.subtasks[subtask].input
     if settings.takeover == "shaped":
-        if recorded.has(f"{subtask}/desired"):
-            yield recorded.motion(f"{subtask}/desired", subtask)
+        found = account(recorded, subtask)
+        jumped = intervals.jumps(recorded.task(subtask).layout, found.desired)
+        where = found.in_force & intervals.decoupled(found.law) & ~jumped
+        for first, last in intervals.pieces(where):
+            yield select(found.desired, slice(first, last + 1))
         return
     topic = recorded.reference_topic(subtask)
     if topic is None:

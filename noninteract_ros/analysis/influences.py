@@ -14,6 +14,9 @@ from noninteract_ros.operator.narrator import Sampler
 
 FIRST_START = "the first state"  # What the controller says of a start that every run has.
 INPUTS = ("target_pose", "target_twist", "wrench")
+# Kinds of influences that the desired motion tells of, or the transitions that are counted.
+MOTION, CHANGE = "motion", "change"
+OTHER = "other"
 
 
 @dataclass(frozen=True)
@@ -23,10 +26,13 @@ class Influence:
     Attributes:
         subtask: Subtask whose input it is; empty where it acts on the team or the controller.
         text: What it was.
+        kind: `MOTION` where all of it shows in what the subtask is asked to do, `CHANGE` where it
+            is counted while it lasts, or `OTHER`.
     """
 
     subtask: str
     text: str
+    kind: str = OTHER
 
 
 def influences(recorded: Recorded) -> list[Influence]:
@@ -47,7 +53,9 @@ def influences(recorded: Recorded) -> list[Influence]:
         for source in SOURCES:
             prefix = f"{subtask}/{source}"
             found += [
-                Influence(subtask, f"input on {prefix}/{kind}")
+                Influence(
+                    subtask, f"input on {prefix}/{kind}", OTHER if kind == "wrench" else MOTION
+                )
                 for kind in INPUTS
                 if recorded.has(f"{prefix}/{kind}")
             ]
@@ -62,13 +70,13 @@ def _unforeseen(
     """References that the scenario's own source does not give."""
     topic = f"{subtask}/{source}/reference"
     if sampler is None:
-        return [Influence(subtask, f"references on {topic}")]
+        return [Influence(subtask, f"references on {topic}", MOTION)]
     series = recorded.run.trajectory(topic)
     found = []
     # A source that saw a state twice says again what it has said; that changes nothing.
     if len(series.contradicted):
         text = f"different references for the same instant on {topic}"
-        found.append(Influence(subtask, text))
+        found.append(Influence(subtask, text, MOTION))
     if not len(series.stamps) or not recorded.lockstep:
         return found  # In wall time a source counts from when it was started.
     foreseen, following = set(), -0.5 / recorded.rate
@@ -77,7 +85,7 @@ def _unforeseen(
         foreseen.add(stamp(following))
     stamps = np.round(series.stamps * 1e9).astype(np.int64).tolist()
     if not foreseen.issuperset(stamps):
-        found.append(Influence(subtask, f"references at other instants on {topic}"))
+        found.append(Influence(subtask, f"references at other instants on {topic}", MOTION))
     return found
 
 
@@ -104,11 +112,14 @@ def _changes(recorded: Recorded) -> list[Influence]:
             led_by = values.get(f"{name} led by", spec.input.authority).split(",")[0]
             if led_by not in (spec.input.authority, *spec.input.hand_over_to):
                 texts[f"authority over {name} changed to {led_by}"] = None
-    if changed:
-        texts[f"parameters were changed: {', '.join(changed)}"] = None
     counts = recorded.told(recorded.stack.names[0], "transitions")
-    if not texts and counts is not None and np.ptp(counts[1]) > 0.0:
+    if not texts and not changed and counts is not None and np.ptp(counts[1]) > 0.0:
         texts["a stop, a change of law or gains, or a new start"] = (
             None  # Too short to be told of.
         )
-    return [Influence("", text) for text in texts]
+    found = [Influence("", text, CHANGE) for text in texts]
+    if changed:
+        told_of = all(name == "law" or name.endswith(".authority") for name in changed)
+        text = f"parameters were changed: {', '.join(changed)}"
+        found.append(Influence("", text, CHANGE if told_of else OTHER))
+    return found

@@ -8,19 +8,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rehearsed import Act, Tamper, record, scenario_values
+from rclpy.serialization import serialize_message
+from rehearsed import DIAGNOSTICS, Act, Tamper, record, scenario_values
 
 from noninteract_ros.analysis import intervals
 from noninteract_ros.analysis.account_figure import account_figure
 from noninteract_ros.analysis.checks import Check
+from noninteract_ros.analysis.closed_form import closed_form
 from noninteract_ros.analysis.energy_account import account
 from noninteract_ros.analysis.figures import storage_figure, tracking_figure
+from noninteract_ros.analysis.influences import influences
 from noninteract_ros.analysis.marks import transitions
 from noninteract_ros.analysis.metrics import measure
 from noninteract_ros.analysis.passivity import observe
 from noninteract_ros.analysis.recorded import Recorded
+from noninteract_ros.analysis.recording import RunWriter
 from noninteract_ros.control.inputs import Rate
 from noninteract_ros.control.subtask_input import AUTHORITIES
+from noninteract_ros.nodes.messages import Level, to_diagnostics, to_status
 from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario_file import find_scenario, for_console, read_parameters
 
@@ -94,7 +99,13 @@ def measured(
     acts: Mapping[float, Act],
     tamper: Tamper | None = None,
 ) -> tuple[Recorded, dict[str, Check]]:
-    recorded = Recorded(record(folder, values, 3.0, tamper, acts=acts))
+    told = {"changed parameters": "cooperative.stiffness" if stiffer in acts.values() else "none"}
+
+    def tell(writer: RunWriter) -> None:
+        said = to_diagnostics(1, [to_status("/team/controller", Level.OK, "running", told)])
+        writer.add("/diagnostics", DIAGNOSTICS, 2, 2, serialize_message(said))
+
+    recorded = Recorded(record(folder, values, 3.0, tamper, tell, acts))
     found = measure(recorded, other_laws=False)
     return recorded, {check.name: check for check in found.checks}
 
@@ -115,7 +126,6 @@ def test_a_run_that_is_led_by_hand_fails_no_claim(
     for claim in ("storage_passive", "storage_rate"):
         assert checks[f"{claim}.cooperative"].passed
         assert checks[f"{claim}.relative"].passed
-    assert "parameters" not in checks["reproduction"].reason  # Nobody told of them here.
     assert "law changed to natural" in checks["reproduction"].reason
 
 
@@ -147,6 +157,25 @@ def account_of_gates(recorded: Recorded, t: np.ndarray) -> np.ndarray:
     assert told is not None
     counts = np.interp(t - 0.02, *told), np.interp(t + 0.02, *told)
     return np.asarray(counts[0] == counts[1])
+
+
+def test_each_subtask_still_follows_its_own_equation(tmp_path: Path) -> None:
+    """(29) is judged between the changes, by the motion that was asked for; gains are not told."""
+    acts = {time: act for time, act in SESSION.items() if act is not stiffer}
+    recorded, checks = measured(tmp_path / "sound", values_of("paper"), acts)
+    for name in ("closed_form.cooperative", "closed_form.relative"):
+        assert checks[name].passed
+    found = closed_form(recorded, "cooperative", influences(recorded))
+    assert found.t.size < 0.95 * len(recorded.t)
+    assert not ((found.t > 1.25) & (found.t < 1.45)).any()  # Under `natural`.
+
+    def drift(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+        if topic == "joint_states" and time > 2.6:
+            arrays[0] = arrays[0] + [0.05 * (time - 2.6), 0.0, 0.0, 0.0]
+        return arrays
+
+    _, broken = measured(tmp_path / "broken", values_of("paper"), acts, drift)
+    assert broken["closed_form.relative"].passed is False
 
 
 def test_a_reset_is_no_motion(session: tuple[Recorded, dict[str, Check]]) -> None:
