@@ -66,16 +66,21 @@ def test_equal_stamps_are_the_single_topic_to_the_bit(ros: Ros) -> None:
     together.destroy_node()
 
 
-def lead(hall: Hall, now: float) -> None:
-    """The human leads the middle of the grasp there and back, at up to 0.5 m/s."""
-    task = hall.stack.subtasks[0]
-    codec = SubtaskCodec(task.name, task.elements, task.axes)
-    w, along = 2.0 * np.pi / 0.8, np.array([0.04, -0.05])
-    start = hall.stack.evaluate(hall.team.state(hall.team.q0, np.zeros(4))).x[:2]
-    shape = np.array([1.0 - np.cos(w * now), w * np.sin(w * now), w**2 * np.cos(w * now)])
-    position, velocity, acceleration = shape[:, None] * along
-    words = codec.encode(0, start + position, velocity, acceleration)
-    hall.controller.hear("/team/cooperative/human/reference", words)
+class Human:
+    """Leads the middle of the grasp in a hall there and back, at up to 0.5 m/s."""
+
+    def __init__(self, hall: Hall) -> None:
+        task = hall.stack.subtasks[0]
+        self._hall, self._codec = hall, SubtaskCodec(task.name, task.elements, task.axes)
+        self._start = hall.stack.evaluate(hall.team.state(hall.team.q0, np.zeros(4))).x[:2]
+
+    def lead(self, now: float) -> None:
+        """Says where the middle is to be at a time [s]."""
+        w, along = 2.0 * np.pi / 0.8, np.array([0.04, -0.05])
+        shape = np.array([1.0 - np.cos(w * now), w * np.sin(w * now), w**2 * np.cos(w * now)])
+        position, velocity, acceleration = shape[:, None] * along
+        words = self._codec.encode(0, self._start + position, velocity, acceleration)
+        self._hall.controller.hear("/team/cooperative/human/reference", words)
 
 
 def run(hall: Hall, age: int) -> tuple[float, float]:
@@ -86,13 +91,13 @@ def run(hall: Hall, age: int) -> tuple[float, float]:
         age: How many ticks late.
     """
     told: list[bytes] = []
-    error, acceleration = 0.0, 0.0
+    human, error, acceleration = Human(hall), 0.0, 0.0
     for tick in range(round(0.5 * hall.simulation.rate)):
         told.append(hall.state("right"))
         if tick % 2 == 0:
             hall.tell("left")
             hall.controller.hear(hall.drivers["right"].states_topic, told[max(0, tick - age)])
-            lead(hall, hall.simulation.now)
+            human.lead(hall.simulation.now)
             hall.turn()
         v = hall.simulation.v
         hall.step()
@@ -131,8 +136,9 @@ def test_states_of_different_times_cost_what_the_prediction_does(
 def test_a_late_robot_holds_the_whole_team_until_it_is_back(halls: Any) -> None:
     """Who is late is said; the others brake; nobody is pulled when it returns."""
     hall = halls(cooperative={"takeover": "direct"})
+    human = Human(hall)
     for tick in range(300):
-        lead(hall, 1e-3 * tick)
+        human.lead(1e-3 * tick)
         hall.tell("left", "right")
         hall.turn()
         hall.step()
@@ -140,7 +146,7 @@ def test_a_late_robot_holds_the_whole_team_until_it_is_back(halls: Any) -> None:
     assert np.abs(hall.simulation.v[:2]).max() > 0.1
     assert hall.status()[0] < 2
     for tick in range(300, 700):
-        lead(hall, 1e-3 * tick)
+        human.lead(1e-3 * tick)
         hall.tell("left")
         hall.turn()
         expected = (2, "holding: states of right are more than 20 ms behind the others'")
