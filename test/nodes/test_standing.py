@@ -24,7 +24,7 @@ def says(stack: Stack, level: int, text: str, older: float = 0.0) -> None:
             return False
         return found[:2] == (level, text)
 
-    until(said, f"{text!r}, not {stack.ear.status.get('controller')}")
+    until(said, repr(text))
 
 
 @pytest.fixture(params=[True, False], ids=["lockstep", "wall time"])

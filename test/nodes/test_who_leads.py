@@ -57,7 +57,7 @@ def test_the_parameter_follows_a_plan(ros: Ros, lockstep: bool) -> None:
             leaders.append(leader)
         return leader == "hold"
 
-    until(over, f"the whole plan, not {leaders}")
+    until(over, lambda: f"the whole plan, not {leaders}")
     assert leaders == ["autonomy", "human", "hold"]
     agree(stack, "hold")
     assert stack.ear.value("controller", "changed parameters") == "none"
