@@ -142,7 +142,7 @@ def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, way: 
     NaN where nobody recorded the references.
     """
     work = np.zeros(len(rows))
-    wanted = _desired_velocity(recorded, recorded.t[rows] + 0.5 / recorded.rate)
+    wanted = _desired_velocity(recorded, recorded.t[rows])
     if wanted is None:
         return np.full(len(rows), np.nan)
     team, rate = recorded.team, recorded.rate
@@ -168,17 +168,25 @@ def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, way: 
 
 
 def _desired_velocity(recorded: Recorded, t: Array) -> Array | None:
-    """Desired velocities of all subtasks at times t, shape (len(t), n); None if not recorded."""
-    columns = []
+    """Mean desired velocities of all subtasks in the ticks that begin at t, shape (len(t), n).
+
+    Where telemetry tells of a tick its motion goes on to the next one, at which it may jump. In
+    between nobody knows more than the ends. None if it was not recorded.
+    """
+    found, half = np.empty((len(t), recorded.team.n)), 0.5 / recorded.rate
     try:
         for name in recorded.stack.names:
             motion = recorded.motion(f"{name}/desired", name)
             if not len(motion.t):
                 return None
-            columns += [np.interp(t, motion.t, part) for part in motion.velocity.T]
+            part = recorded.part(name)
+            columns = [np.interp(t + half, motion.t, column) for column in motion.velocity.T]
+            found[:, part] = np.array(columns).T
+            rows, told = common_instants(t, motion.t)
+            found[rows, part] = motion.velocity[told] + half * motion.acceleration[told]
     except RecordingError:
         return None
-    return np.array(columns).T
+    return found
 
 
 def surroundings_work(seen: Observation) -> tuple[Array, Array]:

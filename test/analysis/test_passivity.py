@@ -188,3 +188,12 @@ def test_without_an_account_there_is_nothing_to_compare(tmp_path: Path) -> None:
     assert check.passed is None
     assert "energy" in check.reason
     assert metrics["received_J"] == pytest.approx(observe(run).received[-1])
+
+
+def test_references_that_jump_at_a_tick_are_known_from_its_telemetry(tmp_path: Path) -> None:
+    """In contact, led over a link that jitters: the account agrees to rounding."""
+    run = record(tmp_path, read_parameters(find_scenario("delayed_wall")), 1.5)
+    metrics, (check,) = passivity_metrics(Recorded(run))
+    assert abs(metrics["along_references_J"]) > 0.1
+    assert metrics["account"]["disagreement_J"] < 1e-12
+    assert check.passed
