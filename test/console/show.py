@@ -77,25 +77,30 @@ def scenario() -> dict[str, Any]:
 
 
 class Show:
-    """The programs of a scenario with a console, and what their team does.
+    """What a team with a console does.
 
     Attributes:
+        browser: Opens pages.
         ear: Every state of the team.
         port: Where the console listens.
+        ros: For what tests ask of the team besides.
     """
 
-    def __init__(self, ros: Ros, programs: Programs, browser: Browser) -> None:
+    def __init__(self, browser: Browser, ear: Ear, port: int, ros: Ros) -> None:
+        self.browser, self.ear, self.port, self.ros = browser, ear, port, ros
+        until(lambda: len(ear.states) > 10, "the team moves")
+
+    @classmethod
+    def open(cls, ros: Ros, programs: Programs, browser: Browser) -> Show:
+        """The programs of a scenario, one by one."""
         values = scenario()
-        self.browser = browser
-        self.ear: Ear = ros.ear(values)
+        ear = ros.ear(values)
         programs.environment |= {"NONINTERACT_CONSOLE_TOKEN": TOKEN}
         for name in NAMES:
             programs.start(name, values)
         for name in NAMES:  # Each has a deadline of its own: together they start slowly.
-            until(partial(self.ear.status.__contains__, name), f"{name} speaks")
-        found = until(lambda: re.search(r"http://127\.0\.0\.1:(\d+)/", programs.log(NAMES[3])))
-        self.port = int(found[1])
-        until(lambda: len(self.ear.states) > 10, "the team moves")
+            until(partial(ear.status.__contains__, name), f"{name} speaks")
+        return cls(browser, ear, address(programs, NAMES[3]), ros)
 
     @contextmanager
     def page(
@@ -179,9 +184,9 @@ def shoot(page: Page, name: str) -> None:
     page.screenshot(path=OUTPUT / f"{name}.png")
 
 
-def drag(page: Page, axis: str, by: tuple[float, float]) -> None:
-    """Takes the handle's arrow of an axis and pulls it by so many pixels; it stays held."""
-    x, y = page.evaluate(f"operatorConsole.arrow('{axis}')")
+def drag(page: Page, axis: str, by: tuple[float, float], part: str = "arrow") -> None:
+    """Takes the handle's arrow or ring of an axis, pulls it by so many pixels, and holds it."""
+    x, y = page.evaluate(f"operatorConsole.{part}('{axis}')")
     page.mouse.move(x, y)
     page.mouse.down()
     for step in range(1, 11):
@@ -212,6 +217,14 @@ def frozen(browser: Browser) -> Iterator[None]:
     finally:
         for pid in pids:
             os.kill(pid, signal.SIGCONT)
+
+
+def address(programs: Programs, name: str) -> int:
+    """Port of the console that a program has printed."""
+    found = until(
+        lambda: re.search(r"http://127\.0\.0\.1:(\d+)/", programs.log(name)), "the address"
+    )
+    return int(found[1])
 
 
 class Relay:

@@ -12,6 +12,8 @@ import pytest
 from harness import Ros
 from pages import RawPage
 from programs import Programs
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
 from show import (
     TOKEN,
     Relay,
@@ -24,6 +26,7 @@ from show import (
     shoot,
     wait,
 )
+from std_msgs.msg import String
 from waiting import until
 from websockets.exceptions import ConnectionClosed
 
@@ -53,7 +56,7 @@ def show(module_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterat
         left.callback(ros.close)
         programs = Programs(tmp_path_factory.mktemp("show"), module_domain)
         left.callback(programs.close)
-        yield Show(ros, programs, browser)
+        yield Show.open(ros, programs, browser)
 
 
 @pytest.fixture(scope="module")
@@ -242,6 +245,41 @@ def test_a_subtask_is_handed_over_in_mid_motion(show: Show, page: Page) -> None:
     show.rests()
 
 
+def test_errors_energies_and_the_tank_are_plotted(show: Show, page: Page) -> None:
+    """A plot each, with numbers of this team, and the tank where the law has one."""
+    law = page.input_value("#law")
+    page.select_option("#law", "energy_gated")
+    titles = ["Tracking error [m]", "Storage [J]", "Power supplied [W]", "Tank [J] and σ"]
+    drawn = "[...document.querySelectorAll('#plots h3')].map((title) => title.textContent)"
+    wait(page, f"{titles}.every((title) => {drawn}.includes(title))")
+    page.locator("#plots").scroll_into_view_if_needed()
+    shoot(page, "plots")
+    page.select_option("#law", law)
+    wait(page, f"operatorConsole.status().law === '{law}'")
+
+
+def leads(page: Page, source: str) -> None:
+    """Waits until the page's buttons show that a source leads the relative subtask."""
+    button = f"button[data-subtask=relative][data-source={source}]"
+    pressed = f"document.querySelector('{button}').getAttribute('aria-pressed') === 'true'"
+    wait(page, pressed)
+
+
+def test_every_page_shows_who_leads_however_it_came_about(show: Show, page: Page) -> None:
+    """By topic and by parameter, from outside; the page's own buttons are pressed by it."""
+    leads(page, "autonomy")
+    talker = show.ros.probe.create_publisher(String, "relative/authority", 10)
+    show.ros.matched(talker)
+    talker.publish(String(data="human"))
+    leads(page, "human")
+    wanted = Parameter("relative.authority", value="autonomy").to_parameter_msg()
+    request = SetParametersAtomically.Request(parameters=[wanted])
+    service = "controller/set_parameters_atomically"
+    assert show.ros.call(SetParametersAtomically, service, request).result.successful
+    leads(page, "autonomy")
+    show.ros.probe.destroy_publisher(talker)
+
+
 def test_the_human_takes_the_relative_subtask(show: Show, page: Page) -> None:
     """Handed over by the page, its handle squeezes the team, whose middle stays."""
     hand_over(page, "relative", "human")
@@ -282,6 +320,8 @@ def test_the_simulation_is_paused_stepped_and_reset(show: Show, page: Page) -> N
     release()
     page.click("#pause")
     wait(page, "operatorConsole.status().paused")
+    words = "document.querySelector('#programs').textContent"
+    wait(page, f"{words}.includes('waiting: the team is paused')")
     standing = show.ear.now
     page.click("#step")
     until(lambda: show.ear.now > standing, "a step")
