@@ -60,10 +60,10 @@ demo: $(VENV)/installed$(if $(NEEDS_ROBOTS),-robots) ## run a scenario: make dem
 
 # A browser that draws without a graphics card takes the cores from whatever runs beside it, in wall
 # time; what fails once is tried once more.
-BROWSER_TESTS := test/console/test_browser.py
+BROWSER_TESTS := test/console/test_browser.py test/console/test_browser_demo.py
 
 test: lint ## format check, lint, types and all tests
-	$(BIN)/python -m pytest -n 2 --ignore=$(BROWSER_TESTS) $(ARGS)
+	$(BIN)/python -m pytest -n 2 $(BROWSER_TESTS:%=--ignore=%) $(ARGS)
 	$(BIN)/python -m pytest $(BROWSER_TESTS) || $(BIN)/python -m pytest --last-failed $(BROWSER_TESTS)
 
 lint: $(VENV)/installed-dev ## format check, lint and types

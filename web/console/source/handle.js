@@ -78,13 +78,27 @@ export class Handle {
     return { grab: this.grab, by: by.toArray(), turn: turn.toArray() };
   }
 
-  // Where the arrow of an axis can be taken hold of, in the window [px].
-  arrow(axis) {
+  // Length in the world of so much of the handle [m].
+  reach(share) {
     const distance = this.place.position.distanceTo(this.scene.camera.position);
     const wide = 1.9 * Math.tan((Math.PI * this.scene.camera.fov) / 360);
-    const reach = (0.32 * distance * Math.min(wide, 7) * this.controls.size) / 4;
+    return (share * distance * Math.min(wide, 7) * this.controls.size) / 4;
+  }
+
+  // Where the arrow of an axis can be taken hold of, in the window [px].
+  arrow(axis) {
     const offset = new THREE.Vector3();
-    offset[axis] = reach;
+    offset[axis] = this.reach(0.32);
+    return this.scene.inWindow(this.place.position.clone().add(offset));
+  }
+
+  // The same of the ring about an axis: on the near side, away from where it crosses another one.
+  ring(axis) {
+    const about = new THREE.Vector3();
+    about[axis] = 1.0;
+    const offset = this.scene.camera.position.clone().sub(this.place.position);
+    offset[axis] = 0.0;
+    offset.setLength(this.reach(0.5)).applyAxisAngle(about, 0.7);
     return this.scene.inWindow(this.place.position.clone().add(offset));
   }
 }

@@ -221,7 +221,9 @@ setInterval(() => {
 // For tests and measurements: where to take hold of things.
 globalThis.operatorConsole = {
   arrow: (axis) => handle.arrow(axis),
+  ring: (axis) => handle.ring(axis),
   handle: () => handle.place.position.toArray(),
+  turn: () => handle.place.quaternion.toArray(),
   pixel: (point) => scene.inWindow(scene.camera.position.clone().fromArray(point)),
   status: () => state.status,
   drives,
