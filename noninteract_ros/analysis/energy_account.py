@@ -270,9 +270,8 @@ def _holding_work(recorded: Recorded, subtask: str, found: Account, holding: Hol
 
 
 def _late(recorded: Recorded) -> str:
-    """Why nobody knows what holding the torque does, or an empty text."""
-    known = recorded.lockstep or recorded.constant
-    return "" if known else "wall time: torques act late, on inertias that vary"
+    """Why nobody knows what the torques did between the states, or an empty text."""
+    return "" if recorded.lockstep else "wall time: torques act late, ticks are not evenly spaced"
 
 
 def _rubbing(recorded: Recorded) -> str:

@@ -213,7 +213,8 @@ def test_in_wall_time_only_what_holds_there_is_claimed(tmp_path: Path) -> None:
     """Every run is another one then: nothing about single ticks passes or fails."""
     found = findings(tmp_path, lose, lockstep=False)
     by_name = checks(found)
-    for name in ("complete.ticks_missing", "closed_form.relative", "reproduction"):
+    storage = [f"storage_{claim}.relative" for claim in ("growth", "passive", "rate")]
+    for name in ("complete.ticks_missing", "closed_form.relative", "reproduction", *storage):
         assert by_name[name].passed is None
         assert "wall time" in by_name[name].reason
     assert by_name["noninteraction.human"].passed is None
