@@ -17,6 +17,7 @@ from noninteract_ros.scenario_file import load_scenario
 
 START_TIMEOUT = 180.0  # [s] at the first start on a machine the law is compiled
 STALL_TIMEOUT = 60.0  # [s] wall time without a step after which a run is given up
+SETTLING = 0.2  # [s] at the end, in which what was lost on its way to the recorder is sent again
 LISTEN = 1.0  # [s] time to find out who else is in the namespace
 
 
@@ -103,3 +104,4 @@ def _follow(monitor: Monitor, progress: Callable[[float, str], None], patience: 
         elif time.monotonic() - moved_at > patience:
             told = {name: status.text for name, status in monitor.status.items()}
             raise StackError(f"the team stands still at {now:.3f} s: {told}")
+    monitor.spin(SETTLING)
