@@ -13,14 +13,13 @@ from noninteract_ros.analysis.delay import delay_check
 from noninteract_ros.analysis.identities import identities
 from noninteract_ros.analysis.identity_check import check_identities
 from noninteract_ros.analysis.law_probe import LawProbe
-from noninteract_ros.analysis.loops import Loop, closed_loops
+from noninteract_ros.control.sampled_loops import MARGINAL, Loop, closed_loops
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario_file import find_scenario, load_scenario
 
 STATES = 20  # random states, unless another number is asked for
 SINGULAR = 1e-6  # smallest singular value below which the subtasks count as dependent
-MARGINAL = 1e-9  # growth beyond 1 that rounding may cause where a mode neither grows nor decays
 
 
 def _gauntlet(settings: CheckSettings) -> CheckReport:
@@ -71,7 +70,7 @@ def check_scenario(name: str, scenario: Scenario, settings: CheckSettings) -> Ch
     checks = [
         at_least("smallest singular value at the initial state", smallest, SINGULAR, ""),
         *(
-            at_most(f"growth per tick, {loop.name}", loop.growth, 1 + MARGINAL, "")
+            at_most(f"growth per tick, {loop.name}", loop.growth, 1.0 + MARGINAL, "")
             for loop in loops
         ),
         *identities(probe, settings.samples or STATES, settings.seed),
@@ -84,7 +83,7 @@ def check_scenario(name: str, scenario: Scenario, settings: CheckSettings) -> Ch
         _subtasks(scenario, stack.subtasks, dynamics.inertias),
         _loops(loops),
     )
-    warnings = tuple(text for loop in loops if (text := loop.warning(rate)))
+    warnings = tuple(text for loop in loops if (text := loop.warning()))
     return CheckReport(name, sections, tuple(checks), warnings)
 
 

@@ -10,8 +10,8 @@ the dynamics,
 It, and the law `natural`, meet the inertia Lambda of all subtasks together where the
 noninteracting law meets M_i. Damping that suits M_i can be too much for a light wrist in Lambda:
 held over a tick it overturns the wrist's velocity once an eigenvalue of Lambda^-1 D exceeds two in
-a tick, as it does in dual_panda_free (4.4 at 1 kHz). For a fair comparison both therefore run with
-damping of their own, critical in every mode of K and Lambda (double diagonalisation),
+a tick. For a fair comparison, whatever the gains, both therefore run with damping of their own,
+critical in every mode of K and Lambda (double diagonalisation),
 
     K V = Lambda V diag(w^2),    V' Lambda V = 1,    D = Lambda V diag(2 w) V' Lambda
 """

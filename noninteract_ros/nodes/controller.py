@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from std_msgs.msg import Header
 from std_srvs.srv import Trigger
 
 from noninteract_ros.arrays import Array
@@ -20,7 +21,7 @@ from noninteract_ros.nodes.authority import AuthorityTopics
 from noninteract_ros.nodes.chronicle import Chronicle
 from noninteract_ros.nodes.controller_parameters import LiveParameters
 from noninteract_ros.nodes.lockstep import SourceWatch, StampOrder, state_lead
-from noninteract_ros.nodes.messages import Level, SubtaskCodec
+from noninteract_ros.nodes.messages import Level, SubtaskCodec, stamp_ns
 from noninteract_ros.nodes.node import ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 from noninteract_ros.nodes.source_topics import listen
@@ -57,11 +58,14 @@ class Controller(ScenarioNode):
         self._order, self._lead = StampOrder(), state_lead(general.rate)
         self._missing: list[str] = []
         self._answered: int | None = None
+        self._put_back: int | None = None
         self._stop_asked = False
         self._now = 0.0
         self._telemetry = Telemetry(self, team, stack)
         self._chronicle = Chronicle(self, self.core, self._telemetry)
-        self._live = LiveParameters(self, self.core, self._post, self._chronicle.changed)
+        self._live = LiveParameters(
+            self, self.core, self._post, self._chronicle.changed, self._configuration
+        )
         self._authority = AuthorityTopics(self, stack.names)
         self._standing = Standing(self)
         self._watch = SourceWatch(
@@ -70,6 +74,7 @@ class Controller(ScenarioNode):
             general.lockstep_timeout,
         )
         self._link = TeamLink(self, team, self._take_state)
+        self.subscribe(Header, "put_back", self._on_put_back)
         for subtask in stack.subtasks:
             codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes, subtask.rotates)
             for source in SOURCES:
@@ -147,9 +152,17 @@ class Controller(ScenarioNode):
         if self.lockstep:
             self._answer_if_complete()
 
+    def _on_put_back(self, message: Header) -> None:
+        """The team is at its start again from a state on, while its time goes on."""
+        self._put_back = stamp_ns(message.stamp)
+
+    def _configuration(self) -> Array | None:
+        state = self._state
+        return None if state is None else state[1]
+
     def _begin_anew(self, stamp: int) -> None:
         """The team was started anew: what was heard belongs to its former life."""
-        self._state = self._answered = None
+        self._state = self._answered = self._put_back = None
         self._order.forget()
         self._order.note("joint_states", stamp)
         self._telemetry.forget()
@@ -168,6 +181,9 @@ class Controller(ScenarioNode):
 
     def _answer(self, stamp: int, q: Array, v: Array, applied: Array | None) -> None:
         began = time.perf_counter()
+        if self._put_back is not None and stamp >= self._put_back:
+            self._put_back = None
+            self.core.gate.restart()  # The account of its former life is not this one's.
         tick = self.core.step(seconds(stamp), q, v, applied, self._telemetry.wrenches)
         self._link.answer(stamp, tick)
         self._answered = stamp

@@ -9,7 +9,9 @@ from typing import Any
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.parameter import Parameter
 
+from noninteract_ros.arrays import Array
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
+from noninteract_ros.control.loop_guard import LARGEST, LoopGuard
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.node import ScenarioNode
@@ -24,6 +26,7 @@ class LiveParameters:
         core: The controller.
         post: Has the thread of the core run something.
         changed: Takes the names of parameters that were changed.
+        configuration: Where the team is, shape (nq,); None, while that is not known.
     """
 
     def __init__(
@@ -32,6 +35,7 @@ class LiveParameters:
         core: TeamController,
         post: Callable[[Callable[[], None]], None],
         changed: set[str],
+        configuration: Callable[[], Array | None],
     ) -> None:
         self._node, self._core, self._post, self._changed = node, core, post, changed
         self._authorities = {name: item.authority for name, item in core.inputs.items()}
@@ -41,8 +45,18 @@ class LiveParameters:
             name: (hint, rule) for name, hint, rule, _ in node.scenario.parameters() if rule.live
         }
         self._impedances = {name: spec.impedance for name, spec in node.scenario.subtasks.items()}
-        self._tank = node.scenario.tank
+        self._law, self._tank = node.scenario.general.law, node.scenario.tank
+        self._configuration = configuration
+        self._guard = self._own_guard()
         node.add_on_set_parameters_callback(self._on_set)
+
+    def _own_guard(self) -> LoopGuard | None:
+        """With a team of its own: parameters are set in another thread than the loop's."""
+        scenario = self._node.scenario
+        if self._core.team.n > LARGEST:
+            return None
+        team = scenario.build_team()
+        return LoopGuard(team, scenario.build_stack(team), scenario.general.rate)
 
     def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
         """Takes all changes or none; the reason names what is allowed."""
@@ -60,10 +74,13 @@ class LiveParameters:
                     tank = replace(tank, **{item: value})
                 else:
                     self._plan(parameter.name, parameter.value, impedances, changes)
-            stack_impedance(self._core.stack.subtasks, list(impedances.values()))
+            law = next((item.value for item in parameters if item.name == "law"), self._law)
+            objection = self._objection(law, impedances)
             tank.check()
         except ScenarioError as error:
             return SetParametersResult(successful=False, reason=str(error))
+        if objection:
+            return SetParametersResult(successful=False, reason=objection)
         self._changed |= {item.name for item in parameters} & self._rules.keys()
         for parameter in parameters:
             subtask, _, item = parameter.name.rpartition(".")
@@ -74,10 +91,25 @@ class LiveParameters:
                 changes.append(partial(self._core.set_impedance, name, settings))
         if tank != self._tank:
             changes.append(partial(setattr, self._core.gate, "settings", tank))
-        self._impedances, self._tank = impedances, tank
+        self._law, self._impedances, self._tank = law, impedances, tank
         self._asked += 1
         self._post(partial(self._run_all, changes))
         return SetParametersResult(successful=True)
+
+    def _objection(self, law: str, impedances: dict[str, ImpedanceSettings]) -> str:
+        """Why the sampled loop of law and gains would diverge here, or an empty text.
+
+        Raises:
+            ScenarioError: Gains do not fit their subtask.
+        """
+        subtasks = self._core.stack.subtasks
+        wanted = stack_impedance(subtasks, list(impedances.values()))
+        if self._guard is None or (law, impedances) == (self._law, self._impedances):
+            return ""
+        in_force = stack_impedance(subtasks, list(self._impedances.values()))
+        q = self._configuration()
+        q = self._core.team.q0 if q is None else q
+        return self._guard.objection(q, (law, wanted), (self._law, in_force))
 
     def follow_authority(self) -> None:
         """Has the parameters tell who leads, where it is not who was last asked for."""

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from noninteract_ros.clock import seconds, tick_stamp
@@ -62,6 +62,7 @@ class RobotTeam(ScenarioNode):
             self.create_publisher(WrenchStamped, f"{name}/external_wrench", LOOP_QOS)
             for name in team.names
         ]
+        self._put_back_to = self.create_publisher(Header, "put_back", LOOP_QOS)
         self._clock_to = (
             self.create_publisher(Clock, "/clock", LOOP_QOS) if general.publish_clock else None
         )
@@ -144,12 +145,14 @@ class RobotTeam(ScenarioNode):
     def _finished(self) -> bool:
         return self._end_tick is not None and self._simulation.tick >= self._end_tick
 
-    def _publish(self) -> None:
-        simulation = self._simulation
+    def _next_stamp(self) -> int:
+        """Stamp of a state that is published now [ns]."""
         if self.lockstep:
-            stamp = tick_stamp(simulation.tick, simulation.rate)
-        else:
-            stamp = self.get_clock().now().nanoseconds
+            return tick_stamp(self._simulation.tick, self._simulation.rate)
+        return self.get_clock().now().nanoseconds
+
+    def _publish(self) -> None:
+        simulation, stamp = self._simulation, self._next_stamp()
         if stamp != self._stamp:
             self._stamp_before, self._stamp = self._stamp, stamp
         self._sent_at = time.monotonic()
@@ -240,6 +243,7 @@ class RobotTeam(ScenarioNode):
         # Time goes on, so that no stamp goes back.
         self._simulation.tick += 1
         self._command = None
+        self._put_back_to.publish(Header(stamp=messages.to_stamp(self._next_stamp())))
         self._publish()
         return True, "at the initial state"
 

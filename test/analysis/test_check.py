@@ -10,6 +10,7 @@ import pytest
 import yaml
 from planar_arms import PlanarArms, mixed_subtasks
 from repository import ROOT
+from scipy.linalg import expm
 
 from noninteract_ros import cli
 from noninteract_ros.analysis import check
@@ -17,10 +18,10 @@ from noninteract_ros.analysis.check import run_check
 from noninteract_ros.analysis.check_report import CheckReport, CheckSettings
 from noninteract_ros.analysis.identities import identities
 from noninteract_ros.analysis.law_probe import LawProbe
-from noninteract_ros.analysis.loops import linearised
 from noninteract_ros.control import decoupling, plain_form
 from noninteract_ros.control.impedance import Impedance
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.control.sampled_loops import Loop
+from noninteract_ros.scenario_file import load_scenario, read_parameters
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
@@ -135,24 +136,84 @@ def test_a_low_rate_is_warned_of_before_it_destabilises(tmp_path: Path) -> None:
     """At 100 Hz the relative loop of 31 /s has too few ticks; at 10 Hz its torque diverges."""
     slow = run_check(scenario_file(tmp_path, rate=100.0, telemetry_rate=50.0), FEW)
     assert slow.passed
-    assert len(slow.warnings) == 2
+    assert len(slow.warnings) == 3
     assert "relative: 100 Hz is low" in slow.warnings[1]
     report = run_check(scenario_file(tmp_path, rate=10.0, telemetry_rate=10.0), FEW)
     assert [item.name for item in report.checks if not item.passed] == [
-        "growth per tick, relative"
+        "growth per tick, relative",
+        "growth per tick, all subtasks at sigma = 0",
     ]
 
 
 def test_growth_is_what_stepping_the_loop_shows() -> None:
     """The growth per tick is the limit of a norm's ratio when the held loop is stepped."""
     M, D, K, rate = 2.0, 3.0, 40.0, 50.0
-    loop = linearised("one", *(np.array([[value]]) for value in (M, D, K)), rate)
+    loop = Loop("one", *(np.array([[value]]) for value in (M, D, K)), rate)
     e, speed, norms = 1.0, 0.0, []
     for _ in range(2000):
         a = -(K * e + D * speed) / M
         e, speed = e + speed / rate + 0.5 * a / rate**2, speed + a / rate
         norms.append(np.hypot(e, speed))
     assert (norms[-1] / norms[0]) ** (1 / 1999) == pytest.approx(loop.growth, rel=1e-3)
+
+
+def dense_growth(team: Team, stack: SubtaskStack, impedance: Impedance, rate: float) -> float:
+    """Of joints that are pushed by J'(-D e_rate - K e), exactly over a tick with this held."""
+    state = team.state(team.q0, np.zeros(team.n))
+    J, n = stack.evaluate(state).J, team.n
+    # e = J q: the state is (q, v, torque), and the torque holds.
+    flow = np.zeros((3 * n, 3 * n))
+    flow[:n, n : 2 * n], flow[n : 2 * n, 2 * n :] = np.eye(n), np.linalg.inv(state.M)
+    held = expm(flow / rate)[: 2 * n]
+    feedback = J.T @ np.hstack([impedance.stiffness[:, None] * J, impedance.damping[:, None] * J])
+    tick = held @ np.vstack([np.eye(2 * n), -feedback])
+    return float(np.abs(np.linalg.eigvals(tick)).max())
+
+
+@pytest.mark.parametrize("damping", [90.0, 640.0])
+def test_the_loop_that_closed_gates_leave_is_judged_too(tmp_path: Path, damping: float) -> None:
+    """With sigma at 0 all subtasks are coupled, and may diverge where each alone is stable."""
+    values = read_parameters(ROOT / "config" / "planar_arms.yaml")
+    values["relative"]["damping"] = [damping]
+    values["rate"] = 500.0
+    file = tmp_path / "arms.yaml"
+    file.write_text(yaml.safe_dump({"/**": {"ros__parameters": values}}))
+    report = run_check(str(file), FEW)
+    scenario = load_scenario(file)
+    team = scenario.build_team()
+    stack = scenario.build_stack(team)
+    impedance = scenario.build_controller(team, stack).mode.impedance
+    expected = dense_growth(team, stack, impedance, 500.0)
+    assert (expected > 1.0) == (damping > 600.0)
+    found = row(report, "loops", "all subtasks at sigma = 0")["growth per tick"]
+    assert found == pytest.approx(expected, rel=1e-9)
+    failing = [item.name for item in report.checks if not item.passed]
+    assert failing == (["growth per tick, all subtasks at sigma = 0"] if expected > 1.0 else [])
+
+
+def test_an_unstable_loop_says_what_would_cure_it() -> None:
+    """The rate and the share of the damping that it names are stable; a little less is not."""
+    M, D, K = (np.diag(values) for values in ([1.0, 0.02], [10.0, 60.0], [30.0, 30.0]))
+    loop = Loop("arms", M, D, K, 1000.0)
+    assert loop.growth == pytest.approx(2.0, abs=0.02)
+    text = loop.warning()
+    assert "multiplies an error by" in text
+    words = text.split()
+    rate, share = float(words[words.index("Hz") - 1]), float(words[words.index("%") - 1]) / 100
+    assert Loop("arms", M, D, K, rate + 1.0).stable
+    assert Loop("arms", M, share * D, K, 1000.0).stable
+    assert not Loop("arms", M, D, K, 0.9 * rate).stable
+    assert not Loop("arms", M, 1.25 * share * D, K, 1000.0).stable
+    weak = Loop("weak", np.eye(1), 0.01 * np.eye(1), 100.0 * np.eye(1), 1000.0)
+    assert "times its damping" in weak.warning()
+
+
+def test_the_gains_of_two_pandas_are_stable_whether_gates_are_open_or_closed() -> None:
+    """They were not: damping made for M_i was too much for a wrist that Lambda leaves alone."""
+    for name in ("dual_panda", "dual_panda_free"):
+        report = run_check(name, FEW)
+        assert report.passed
+        assert not report.warnings
 
 
 def test_natural_is_one_loop_of_all_subtasks(tmp_path: Path) -> None:

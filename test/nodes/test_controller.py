@@ -10,6 +10,7 @@ from harness import Ros, Stack, paper
 from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter, parameter_value_to_python
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from waiting import until
 
@@ -115,6 +116,32 @@ def test_refused_changes_leave_everything_as_it_is(ros: Ros) -> None:
     np.testing.assert_array_equal(effort[1:], expected_run.torque)
 
 
+def test_a_law_or_gains_that_would_diverge_are_refused(ros: Ros) -> None:
+    """With the reason and a cure; what calms the team, and what is stable, is taken."""
+    stack = ros.stack(paper(**STRAINED, law="noninteracting", rate=200.0)).begin()
+    stack.run_until(0.05)
+    # M_r = 0.75 kg stands 299 N s/m at 200 Hz; in Lambda the lighter robot stands less.
+    assert change(ros, relative__damping=[280.0, 280.0]) == (True, "")
+    ok, reason = change(ros, law="natural")
+    assert not ok
+    assert "law natural, all subtasks: held over a tick of 5 ms" in reason
+    assert "of its damping" in reason
+    assert not change(ros, law="energy_gated")[0]
+    assert not change(ros, relative__damping=[310.0, 310.0])[0]
+    assert parameters(ros, "law", "relative.damping") == ["noninteracting", [280.0, 280.0]]
+    assert change(ros, law="natural", relative__damping=[100.0, 100.0]) == (True, "")
+
+
+def test_gains_that_diverge_may_come_down_step_by_step(ros: Ros) -> None:
+    """A team that was started with too much damping takes less, though it still is too much."""
+    values = paper(**STRAINED, law="noninteracting", rate=200.0)
+    values["relative"]["damping"] = [400.0, 400.0]
+    ros.stack(values).begin().run_until(0.02)
+    assert not change(ros, relative__damping=[420.0, 420.0])[0]
+    assert change(ros, relative__damping=[320.0, 320.0]) == (True, "")
+    assert change(ros, relative__damping=[100.0, 100.0]) == (True, "")
+
+
 def test_authority_changes_without_a_bump(ros: Ros) -> None:
     """`hold` keeps the subtask where it is, and the human takes over again smoothly."""
     changes = STRAINED | {
@@ -171,6 +198,28 @@ def test_a_reset_of_the_team_is_a_new_start(ros: Ros) -> None:
     # At rest where it is: the first torque after the jump is no spring that snaps back.
     assert np.abs(effort[jump + 1]).max() < 0.5
     assert t[-1] > now
+
+
+@pytest.mark.parametrize("when", [0.12, 0.6])
+def test_a_reset_of_the_team_opens_a_fresh_account(ros: Ros, when: float) -> None:
+    """Also where the team is put back by less than what counts as a jump."""
+    stack = ros.stack(paper(**STRAINED, telemetry_rate=1000.0)).begin()
+    accounts: list[dict[str, float]] = []
+
+    def note(message: Float64MultiArray) -> None:
+        labels = [item.label for item in message.layout.dim]
+        accounts.append(dict(zip(labels, message.data, strict=True)))
+
+    ros.probe.create_subscription(Float64MultiArray, "energy", note, 1000)
+    stack.run_until(when)
+    until(lambda: accounts and accounts[-1]["time"] >= when - 0.01, "the first account")
+    spent = accounts[-1]
+    assert spent["tank"] != 1.0
+    assert ros.call(Trigger, "robot_team/reset").success
+    stack.run_until(stack.ear.now + 0.02)
+    until(lambda: accounts[-1]["account"] > spent["account"], "a fresh account")
+    fresh = next(item for item in accounts if item["account"] > spent["account"])
+    assert (fresh["tank"], fresh["reserve"], fresh["lost"]) == (1.0, 2.0, 0.0)
 
 
 def test_an_input_of_no_authority_changes_nothing(ros: Ros) -> None:
