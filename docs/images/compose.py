@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Puts the figures of a run side by side: python docs/images/compose.py RUN OUT.png."""
+"""Puts the figures of a run side by side: python docs/images/compose.py RUN OUT.png.
+
+So `paper.png` is made, of `noninteract demo paper`. `door.png` is `fig5_energy.png` of `door`,
+`link.png` that of `delayed_wall`, `dual_panda.png` is `motion.png` of `dual_panda`.
+"""
 
 import sys
 from pathlib import Path

@@ -114,9 +114,8 @@ def _changes(recorded: Recorded) -> list[Influence]:
                 texts[f"authority over {name} changed to {led_by}"] = None
     counts = recorded.told(recorded.stack.names[0], "transitions")
     if not texts and not changed and counts is not None and np.ptp(counts[1]) > 0.0:
-        texts["a stop, a change of law or gains, or a new start"] = (
-            None  # Too short to be told of.
-        )
+        # Too short for a diagnosis in between to tell of it.
+        texts["a stop, a change of law or gains, or a new start"] = None
     found = [Influence("", text, CHANGE) for text in texts]
     if changed:
         told_of = all(name == "law" or name.endswith(".authority") for name in changed)

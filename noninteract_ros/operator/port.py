@@ -66,13 +66,14 @@ def affordable(effort: Array, way: Array, metric: Array, doubt: float, limit: fl
         return effort
     length = float(drag @ way)
 
-    def share(damping: float) -> float:
-        left = np.sqrt(max(size - damping * (2.0 * work - damping * length), 0.0))
-        return max(1.0 - damping * doubt / max(left, TINY), 0.0)
+    def shortened_by(damping: float) -> tuple[float, float]:
+        """Length of what damping leaves, and the share of it that its price in doubt leaves."""
+        left = float(np.sqrt(max(size - damping * (2.0 * work - damping * length), 0.0)))
+        return left, max(1.0 - damping * doubt / max(left, TINY), 0.0)
 
     def excess(damping: float) -> float:
-        left = np.sqrt(max(size - damping * (2.0 * work - damping * length), 0.0))
-        return share(damping) * (work - damping * length + doubt * left) - limit
+        left, share = shortened_by(damping)
+        return share * (work - damping * length + doubt * left) - limit
 
     most = 1.0
     while excess(most) > 0.0:
@@ -80,7 +81,7 @@ def affordable(effort: Array, way: Array, metric: Array, doubt: float, limit: fl
         if not np.isfinite(most * most * length):
             return np.zeros_like(effort)
     damping = brentq(excess, 0.0, most)
-    result: Array = share(damping) * (effort - damping * drag)
+    result: Array = shortened_by(damping)[1] * (effort - damping * drag)
     return result
 
 

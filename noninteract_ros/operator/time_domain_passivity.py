@@ -30,7 +30,8 @@ from noninteract_ros.subtasks.layout import Layout
 Limiter = Callable[[Array], Array]
 
 
-def _unlimited(force: Array) -> Array:
+def unlimited(force: Array) -> Array:
+    """A device that can do any force, shape (p,)."""
     return force
 
 
@@ -56,7 +57,7 @@ class ObservedDevice:
         settings: LinkSettings,
         metric: Array,
         period: float,
-        limited: Limiter = _unlimited,
+        limited: Limiter = unlimited,
     ) -> None:
         self._metric, self._period, self._limited = metric, period, limited
         self._reserve, self._filling = settings.reserve, settings.filling

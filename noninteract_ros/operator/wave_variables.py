@@ -11,14 +11,18 @@ their ports and give away no more than was announced (`time_domain_passivity.py`
 what is wanted, the account what may be.
 """
 
-from typing import Any
-
 import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.operator.link_settings import LinkSettings
-from noninteract_ros.operator.time_domain_passivity import ObservedDevice, ObservedTeam
+from noninteract_ros.operator.time_domain_passivity import (
+    Limiter,
+    ObservedDevice,
+    ObservedTeam,
+    unlimited,
+)
+from noninteract_ros.subtasks.layout import Layout
 
 CATCH_UP = 2.0  # [1/s] at which a distance between the ends goes, which waves alone would keep
 
@@ -26,8 +30,14 @@ CATCH_UP = 2.0  # [1/s] at which a distance between the ends goes, which waves a
 class WaveDevice(ObservedDevice):
     """The device's end: takes w, answers a velocity with f = sqrt(2 B) w - B v, tells u."""
 
-    def __init__(self, settings: LinkSettings, metric: Array, *rest: Any) -> None:
-        super().__init__(settings, metric, *rest)
+    def __init__(
+        self,
+        settings: LinkSettings,
+        metric: Array,
+        period: float,
+        limited: Limiter = unlimited,
+    ) -> None:
+        super().__init__(settings, metric, period, limited)
         self._impedance = settings.impedance * metric
         self._root = np.sqrt(2.0 * self._impedance)
 
@@ -46,10 +56,17 @@ class WaveTeam(ObservedTeam):
     the damping. A position that was sent along is caught up with.
     """
 
-    def __init__(self, settings: LinkSettings, layout: Any, metric: Array, *rest: Any) -> None:
+    def __init__(
+        self,
+        settings: LinkSettings,
+        layout: Layout,
+        metric: Array,
+        period: float,
+        start: Reference,
+    ) -> None:
         self._impedance = settings.impedance * metric
         self._root = np.sqrt(2.0 * self._impedance)
-        super().__init__(settings, layout, metric, *rest)
+        super().__init__(settings, layout, metric, period, start)
 
     def resume(self, start: Reference) -> None:
         """Starts from where the device is now, without a wave under way."""
