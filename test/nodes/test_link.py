@@ -48,11 +48,12 @@ def runs_as_rehearsed(ros: Ros, found: dict[str, Any], end: float) -> dict[float
         rehearsal.step()
         if account := rehearsal.link.account:
             expected[tick / 1000] = list(account)
-    count = round(250 * (end - min(expected)))
+    rate = Scenario.from_dict(stack.values).general.telemetry_rate
+    count = round(rate * (end - min(expected)))
     until(lambda: len(told) >= count, "the accounts")
     assert labels[0] == ["time", *LinkAccount._fields]
-    begin = round(250 * min(expected))
-    assert sorted(told)[:count] == [tick / 250 for tick in range(begin, begin + count)]
+    begin = round(rate * min(expected))
+    assert sorted(told)[:count] == [tick / rate for tick in range(begin, begin + count)]
     for now in sorted(told)[:count]:
         assert told[now] == expected[now], now
     return told
