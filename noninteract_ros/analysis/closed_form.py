@@ -19,7 +19,7 @@ from noninteract_ros.analysis.energy_account import account
 from noninteract_ros.analysis.influences import CHANGE, MOTION, Influence
 from noninteract_ros.analysis.recorded import FRICTION, Motion, Recorded, select
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.decoupling import TaskDynamics, task_dynamics
+from noninteract_ros.control.decoupling import DECOUPLING_LAWS, TaskDynamics, task_dynamics
 from noninteract_ros.control.impedance import stack_impedance
 from noninteract_ros.simulation.subtask_object import SIGNS
 from noninteract_ros.team.team import TeamState
@@ -27,8 +27,6 @@ from noninteract_ros.team.team import TeamState
 # [m] at 1 kHz for errors up to 1 m: holding the torque over a tick is of first order in the tick,
 # and the equations are linear (a saturating potential only weakens them).
 LIMIT = 2e-3
-# On point masses they are the same law, as long as the gates of the first are open.
-LAWS = ("energy_gated", "noninteracting", "paper")
 RTOL, ATOL = 1e-10, 1e-12
 SPACING = 0.005  # [s] closer references make a quintic noisy with rounding
 
@@ -221,7 +219,7 @@ def _require(recorded: Recorded, subtask: str, outside: list[Influence]) -> None
     on_tools = all(push.on_tool(recorded.team) for push in scenario.pushes.values())
     changed = recorded.interventions()
     reasons = {
-        f"law {law} does not decouple": law not in LAWS,
+        f"law {law} does not decouple": law not in DECOUPLING_LAWS,
         "the team's inertia is not constant": not recorded.constant,
         "wall time: ticks are not evenly spaced": not recorded.lockstep,
         f"the team touches {', '.join(scenario.surroundings)}": bool(scenario.surroundings),

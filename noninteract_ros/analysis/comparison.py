@@ -27,6 +27,7 @@ from noninteract_ros.analysis.rehearsals import (
     starts,
 )
 from noninteract_ros.arrays import Array
+from noninteract_ros.control.decoupling import DECOUPLING_LAWS
 
 # [m; rad] How far a source may move a subtask that is not its own. On inertias that vary with
 # where the team is, holding the torque over a tick moves it by `holding.deflection` more.
@@ -34,7 +35,6 @@ MOVED = 1e-9
 SAME = 1e-12  # [m, m/s; rad, rad/s] the same arithmetic on another processor may round differently
 # (29) keeps a subtask on its reference whatever others do; how it comes back is another thing.
 OFF = "a subtask is off its reference, and its inertia depends on where the others are"
-DECOUPLING_LAWS = ("energy_gated", "noninteracting", "paper")
 WINDOW = 2.0  # [s] that rehearsals without a source go on after it has begun
 SHORTEST = 2000  # ticks of a rehearsal for its own sake
 BUDGET = 400_000  # coordinates times ticks that one rehearsal may take

@@ -12,11 +12,10 @@ from numpy.typing import NDArray
 from noninteract_ros.analysis.recorded import Motion, Recorded, common_instants
 from noninteract_ros.analysis.series import LabelledSeries
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.decoupling import LAWS
+from noninteract_ros.control.decoupling import DECOUPLING_LAWS, LAWS
 from noninteract_ros.subtasks.layout import Layout
 
 COUNTERS = ("interventions", "transitions")
-DECOUPLING = ("energy_gated", "noninteracting", "paper")
 JUMP = 1e-4  # [m; rad] what leaves its own path by more has jumped
 
 
@@ -49,7 +48,7 @@ def laws(recorded: Recorded, t: Array) -> NDArray[np.str_]:
 
 def decoupled(law: NDArray[np.str_]) -> NDArray[np.bool_]:
     """Whether a law that decouples was in force, from the laws at each instant, shape (n,)."""
-    does = np.isin(law, DECOUPLING)
+    does = np.isin(law, DECOUPLING_LAWS)
     return np.asarray(does[1:] & does[:-1])
 
 

@@ -12,10 +12,10 @@ from noninteract_ros.analysis.intervals import laws
 from noninteract_ros.analysis.recorded import INTERVENTIONS, Recorded, common_instants
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.energy_account import QUANTITIES
+from noninteract_ros.control.energy_gate import GATED
 from noninteract_ros.errors import RecordingError
 
 TOPIC = "energy"
-GATED = "energy_gated"
 LIMITS = ("limit", "too fast", "singularity", "no finite torque")  # in what a controller says
 # Shares of the largest sum that rounding may add to the residual at a tick.
 ROUNDING = 64.0 * float(np.finfo(float).eps)

@@ -17,6 +17,8 @@ from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import TeamState
 
 LAWS = ("energy_gated", "noninteracting", "natural", "paper")
+# On constant inertias they are the same law, as long as the gates of the first are open.
+DECOUPLING_LAWS = ("energy_gated", "noninteracting", "paper")
 
 
 @dataclass(frozen=True, slots=True)
