@@ -20,6 +20,11 @@ class Continuity:
     def __init__(self, team: Team, state_timeout: float) -> None:
         self._team, self._state_timeout = team, state_timeout
         self._last: tuple[float, Array] | None = None
+        self._put_back = False
+
+    def put_back(self) -> None:
+        """The next state is where the team was put, however near that is."""
+        self._put_back = True
 
     def forget(self) -> None:
         """The next state is the first one."""
@@ -33,6 +38,8 @@ class Continuity:
         """Why the state does not follow, or an empty text."""
         if self._last is None:
             return "the first state"
+        if self._put_back:
+            return "put back to its start"
         last, q_last = self._last
         if now - last > self._state_timeout:
             return f"no state for {now - last:.3f} s"
@@ -44,4 +51,4 @@ class Continuity:
 
     def note(self, now: float, q: Array) -> None:
         """Takes a state as the last one."""
-        self._last = (now, q)
+        self._last, self._put_back = (now, q), False

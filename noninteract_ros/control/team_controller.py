@@ -142,8 +142,7 @@ class TeamController:
 
     def resume(self) -> None:
         """Leaves a stop: every subtask holds where it is until it hears from its source."""
-        for item in self.inputs.values():
-            item.forget()
+        self._forget_inputs()
         self._change(replace(self._mode, stopped=False))
 
     def reset(self) -> None:
@@ -155,6 +154,17 @@ class TeamController:
         self._safety.reset()
         for item in self.inputs.values():
             item.reset()
+
+    def put_back(self) -> None:
+        """The team stands at its start again, its time goes on; subtasks hold until led anew."""
+        self._continuity.put_back()
+        self._law.forget()  # What still fades would push the team from where it was put.
+        self.gate.restart()
+        self._forget_inputs()
+
+    def _forget_inputs(self) -> None:
+        for item in self.inputs.values():
+            item.forget()
 
     def _forget_motion(self) -> None:
         self._guard.reset()
@@ -205,7 +215,8 @@ class TeamController:
         relative = min(regular, self.stack.soundness(seen.state))
         share = self._guard.law_share(relative)
         self.outside.see(step, q, v, applied)
-        in_transition = self._in_transition(now, restarted)
+        changing = self._law.changing(now) or self._springs.changing
+        in_transition = bool(restarted) or self._mode.stopped or changing
         moment = self._moment(now, seen, led, share, step)
         if share == 1.0:
             self.gate.book(moment, self._mode.law, applied)
@@ -238,11 +249,6 @@ class TeamController:
             self._mode.law,
             in_transition,
         )
-
-    def _in_transition(self, now: float, restarted: str) -> bool:
-        """Whether something else than law and gains in force takes part in the next torque."""
-        changing = self._law.changing(now) or self._springs.changing
-        return bool(restarted) or self._mode.stopped or changing
 
     def _regulate(self, seen: Seen, wrenches: Array | None, step: float, held: bool) -> None:
         """Integrates what is missing of the force goals, unless something holds the law back."""

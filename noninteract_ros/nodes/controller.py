@@ -183,7 +183,7 @@ class Controller(ScenarioNode):
         began = time.perf_counter()
         if self._put_back is not None and stamp >= self._put_back:
             self._put_back = None
-            self.core.gate.restart()  # The account of its former life is not this one's.
+            self.core.put_back()
         tick = self.core.step(seconds(stamp), q, v, applied, self._telemetry.wrenches)
         self._link.answer(stamp, tick)
         self._answered = stamp

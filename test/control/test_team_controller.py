@@ -317,6 +317,26 @@ def test_a_team_put_elsewhere_starts_anew():
     np.testing.assert_allclose(tick.torque, loop.team.gravity(loop.simulation.q), atol=1e-9)
 
 
+@pytest.mark.parametrize("stops", [True, False])
+def test_a_team_put_back_is_pushed_by_nothing_of_before(stops):
+    """However near its start is: no reference, no fading torque and no account goes on."""
+    loop = Loop()
+    loop.run(60, (0.1, 0.06))
+    spent = loop.controller.gate.account.number
+    if stops:
+        loop.controller.stop()
+        loop.tick()
+    loop.simulation.reset()
+    loop.controller.put_back()
+    if stops:
+        loop.controller.resume()
+    ticks = loop.run(50)
+    assert ticks[0].restarted == "put back to its start"
+    assert ticks[0].account.number > spent
+    for tick in ticks:
+        np.testing.assert_allclose(tick.torque, loop.team.gravity(loop.team.q0), atol=1e-9)
+
+
 def test_a_fast_team_seen_seldom_has_not_jumped():
     """A joint that moves as its velocity says has not been put elsewhere."""
     loop = Loop()

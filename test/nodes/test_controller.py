@@ -192,7 +192,7 @@ def test_a_reset_of_the_team_is_a_new_start(ros: Ros) -> None:
     assert ros.call(Trigger, "robot_team/reset").success
     now = stack.ear.now
     stack.run_until(now + 0.2)
-    until(lambda: "jumped by" in stack.ear.value("controller", "last start"), "the new start")
+    until(lambda: "put back" in stack.ear.value("controller", "last start"), "the new start")
     t, _, v, effort = stack.ear.history(dict(stack.ear.states))
     jump = int(np.argmin(np.abs(v[t > 0.3]).max(axis=1))) + int((t <= 0.3).sum())
     # At rest where it is: the first torque after the jump is no spring that snaps back.
