@@ -52,22 +52,13 @@ def decoupled(law: NDArray[np.str_]) -> NDArray[np.bool_]:
     return np.asarray(does[1:] & does[:-1])
 
 
-def moved(recorded: Recorded, rows: NDArray[np.intp]) -> Array:
-    """Tangent vectors from some states to the next ones, shape (m, n)."""
-    q = recorded.q
-    if q.shape[1] == recorded.team.n:
-        return np.asarray(q[rows + 1] - q[rows])
-    return np.array([recorded.team.difference(q[row], q[row + 1]) for row in rows])
-
-
 def moved_by_itself(recorded: Recorded) -> NDArray[np.bool_]:
     """Whether the team can have come from each recorded state to the next: nobody put it there.
 
     Velocities in between lie between those at both ends but for what is of third order in time.
     """
     h, v = np.diff(recorded.t)[:, None], recorded.v
-    way = moved(recorded, np.arange(len(recorded.t) - 1))
-    off = np.abs(way - 0.5 * h * (v[1:] + v[:-1]))
+    off = np.abs(recorded.steps - 0.5 * h * (v[1:] + v[:-1]))
     return np.asarray(~(off > JUMP + 0.5 * h * np.abs(v[1:] - v[:-1])).any(axis=1))
 
 

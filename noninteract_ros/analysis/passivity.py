@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noninteract_ros.analysis.checks import Check, at_most, not_applicable
-from noninteract_ros.analysis.intervals import moved, moved_by_itself
+from noninteract_ros.analysis.intervals import moved_by_itself
 from noninteract_ros.analysis.recorded import Recorded, common_instants
 from noninteract_ros.analysis.team_account import TeamAccount, limits_acted, team_account
 from noninteract_ros.arrays import Array
@@ -85,7 +85,7 @@ def observe(recorded: Recorded) -> Observation:
     seen &= finite[1:] & finite[:-1]
     rows = np.flatnonzero(seen)
     torque, commanded = _torques(recorded, rows)
-    way = moved(recorded, rows)
+    way = recorded.steps[rows]
     kinetic, gravity = _energies(recorded, np.flatnonzero(finite))
     steps = np.zeros((3, len(recorded.t) - 1))
     steps[0, rows] = (torque * way).sum(axis=1) - np.diff(gravity)[rows]

@@ -4,6 +4,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -116,6 +117,13 @@ class Recorded:
         J, moved = (self.stack.evaluate(state) for state in (here, there))
         same = np.allclose(here.M, there.M) and np.allclose(J.J, moved.J)
         return bool(same and not there.C.any() and not moved.J_rate.any())
+
+    @cached_property
+    def steps(self) -> Array:
+        """Tangent vectors from each state to the next, shape (n - 1, n)."""
+        if self.q.shape[1] == self.team.n:
+            return np.diff(self.q, axis=0)
+        return np.array([self.team.difference(*pair) for pair in pairwise(self.q)])
 
     @cached_property
     def values(self) -> tuple[Array, Array]:

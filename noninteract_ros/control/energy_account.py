@@ -93,3 +93,33 @@ class Account:
     def sound(self) -> bool:
         """Whether the imbalance is what rounding can make; not so, if it is no number."""
         return abs(self.imbalance) <= self.bound
+
+
+def quantities(account: Account, supplied: float, measured: float) -> tuple[float, ...]:
+    """The numbers of `QUANTITIES`, in their order.
+
+    Args:
+        account: The account at a tick.
+        supplied: Power at the port, as forces are measured or estimated [W].
+        measured: Its integral since the account began [J].
+    """
+    tank = account.tank
+    return (
+        account.storage,
+        supplied,
+        account.dissipated,
+        account.demand,
+        tank.level,
+        tank.owed,
+        tank.reserve,
+        tank.sigma,
+        tank.grip,
+        account.residual,
+        account.received,
+        measured,
+        tank.brought,
+        tank.granted,
+        tank.refilled,
+        tank.lost,
+        account.number,
+    )

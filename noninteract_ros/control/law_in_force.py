@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.decoupling import acceleration_against
-from noninteract_ros.control.energy_gate import EnergyGate, Moment
+from noninteract_ros.control.energy_gate import GATED, EnergyGate, Moment
 from noninteract_ros.control.fade import Fade
 from noninteract_ros.control.force_goal import ForceGoals
 from noninteract_ros.control.gated_law import decoupling, gated_acceleration
@@ -104,7 +104,7 @@ class LawInForce:
         dynamics, error, added = moment.dynamics, moment.error, moment.added
         if mode.stopped:
             return dynamics.acceleration_of(v, -self._stop.damping(moment.now) * v)
-        if mode.law == "energy_gated":
+        if mode.law == GATED:
             return gated_acceleration(dynamics, error, added, self._gate.tank)
         if mode.law == "noninteracting":
             return added.acceleration

@@ -10,8 +10,6 @@ from noninteract_ros.control.sampled_loops import Loop, closed_loops
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
-LARGEST = 100  # coordinates; beyond, eigenvalues would keep whoever asks waiting
-
 
 class LoopGuard:
     """Judges modes by their sampled loops, linearised at rest at a configuration.
@@ -38,8 +36,6 @@ class LoopGuard:
             wanted: Law and gains that are asked for.
             in_force: Law and gains until now.
         """
-        if self._team.n > LARGEST:
-            return ""
         try:
             worst = max(self._loops(q, *wanted), key=_growth)
             if worst.stable or worst.growth <= max(map(_growth, self._loops(q, *in_force))):

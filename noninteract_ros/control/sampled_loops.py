@@ -10,6 +10,7 @@ from scipy.linalg import eigh
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.decoupling import TaskDynamics
+from noninteract_ros.control.energy_gate import GATED
 from noninteract_ros.control.impedance import Impedance
 
 TICKS_PER_TIME_CONSTANT = 10.0  # fewer make the sampled loop visibly another one than designed
@@ -158,7 +159,7 @@ def closed_loops(
         Loop(name, inertia, damping[part, part], stiffness[part, part], rate)
         for name, inertia, part in zip(names, dynamics.inertias, dynamics.slices, strict=True)
     ]
-    if law == "energy_gated":
+    if law == GATED:
         name, enough = "all subtasks at sigma = 0", TICKS_WITHOUT_DECOUPLING
         loops.append(Loop(name, dynamics.inertia, damping, stiffness, rate, enough))
     return loops

@@ -12,7 +12,7 @@ from noninteract_ros.control.compiled_layout import CompiledLayout
 from noninteract_ros.control.continuity import Continuity
 from noninteract_ros.control.decoupling import TaskError
 from noninteract_ros.control.energy import Energy, energy
-from noninteract_ros.control.energy_gate import EnergyGate, Moment
+from noninteract_ros.control.energy_gate import GATED, EnergyGate, Moment
 from noninteract_ros.control.energy_tank import TankSettings
 from noninteract_ros.control.force_goal import ForceGoals
 from noninteract_ros.control.gated_law import decoupling, without_law
@@ -79,8 +79,7 @@ class TeamController:
         self.outside = Outside(team, measured, tank.observer_gain)
         self._springs, self._goals = WaitingSprings(transition_time), ForceGoals(team.n)
         max_jerk = np.concatenate([item.max_jerk for item in self.inputs.values()])
-        stop = Stop(stop_rate, max_jerk)
-        self._law = LawInForce(self.gate, self._goals, transition_time, stop)
+        self._law = LawInForce(self.gate, self._goals, transition_time, Stop(stop_rate, max_jerk))
         best = best_regularity(team, stack)
         scout = WayOut(team, stack, best, safety.singularity_begin)
         self._guard = SingularityGuard(team, safety, best, scout)
@@ -103,7 +102,7 @@ class TeamController:
 
     def set_law(self, law: str) -> None:
         """Changes the law without a bump; the gated one begins with a fresh account."""
-        if law == "energy_gated" and self._mode.law != law:
+        if law == GATED and self._mode.law != law:
             self.gate.restart()
         self._change(replace(self._mode, law=law))
 
@@ -117,7 +116,7 @@ class TeamController:
         changed[self.stack.names.index(subtask)] = settings
         impedance = stack_impedance(self.stack.subtasks, changed)
         self._springs.forget()
-        if self._mode.law == "energy_gated":
+        if self._mode.law == GATED:
             impedance = self._springs.begin(self._mode.impedance, impedance)
         self._change(replace(self._mode, impedance=impedance))
         self._settings = changed
@@ -149,7 +148,6 @@ class TeamController:
         """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
         self._continuity.forget()
         self._law.forget()
-        self._forget_motion()
         self.gate.restart()
         self._safety.reset()
         for item in self.inputs.values():
@@ -165,11 +163,6 @@ class TeamController:
     def _forget_inputs(self) -> None:
         for item in self.inputs.values():
             item.forget()
-
-    def _forget_motion(self) -> None:
-        self._guard.reset()
-        self._goals.forget()
-        self.outside.reset()
 
     def _change(self, mode: Mode) -> None:
         self._law.left = self._law.left or self._mode
@@ -205,7 +198,9 @@ class TeamController:
         if restarted or stopped or lost or (left and left.stopped):
             self._rest_at(seen.task.x)
         if restarted:
-            self._forget_motion()
+            self._guard.reset()
+            self._goals.forget()
+            self.outside.reset()
             self.gate.pause()
         led = tuple(
             item.resting(now) if stopped else item.advance(now, step)
@@ -216,7 +211,6 @@ class TeamController:
         share = self._guard.law_share(relative)
         self.outside.see(step, q, v, applied)
         changing = self._law.changing(now) or self._springs.changing
-        in_transition = bool(restarted) or self._mode.stopped or changing
         moment = self._moment(now, seen, led, share, step)
         if share == 1.0:
             self.gate.book(moment, self._mode.law, applied)
@@ -247,7 +241,7 @@ class TeamController:
             restarted,
             self.gate.account,
             self._mode.law,
-            in_transition,
+            bool(restarted) or self._mode.stopped or changing,
         )
 
     def _regulate(self, seen: Seen, wrenches: Array | None, step: float, held: bool) -> None:
@@ -263,7 +257,7 @@ class TeamController:
     ) -> Moment:
         """This tick as law and account see it, with springs that wait one step further."""
         error = self._error(seen, led)
-        tank = self.gate.tank if self._mode.law == "energy_gated" else None
+        tank = self.gate.tank if self._mode.law == GATED else None
         impedance = self._springs.advance(
             self._mode.impedance, error.e, step, tank, self.gate.settings
         )

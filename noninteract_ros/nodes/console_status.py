@@ -9,6 +9,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 
 from noninteract_ros.console.protocol import Said
+from noninteract_ros.nodes.standing import PAUSED, TEAM
 from noninteract_ros.subtasks.stack import SubtaskStack
 
 SILENT = 2.0  # [s] after which a program that told of itself no more is missed
@@ -61,7 +62,7 @@ class Status:
     @property
     def paused(self) -> bool:
         """Whether the simulation is paused."""
-        return self._is("paused", "robot_team", "paused")
+        return self._is("paused", TEAM, PAUSED)
 
     def _is(self, what: str, node: str, text: str) -> bool:
         value, until = self._expected.get(what, (False, 0.0))

@@ -11,11 +11,13 @@ from rclpy.parameter import Parameter
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
-from noninteract_ros.control.loop_guard import LARGEST, LoopGuard
+from noninteract_ros.control.loop_guard import LoopGuard
 from noninteract_ros.control.team_controller import TeamController
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.node import ScenarioNode
 from noninteract_ros.schema import convert
+
+JUDGED = 100  # coordinates; of more, eigenvalues would keep whoever asks for a change waiting
 
 
 class LiveParameters:
@@ -53,7 +55,7 @@ class LiveParameters:
     def _own_guard(self) -> LoopGuard | None:
         """With a team of its own: parameters are set in another thread than the loop's."""
         scenario = self._node.scenario
-        if self._core.team.n > LARGEST:
+        if self._core.team.n > JUDGED:
             return None
         team = scenario.build_team()
         return LoopGuard(team, scenario.build_stack(team), scenario.general.rate)

@@ -14,6 +14,7 @@ from std_srvs.srv import SetBool
 
 from noninteract_ros.errors import NoninteractError
 from noninteract_ros.nodes.messages import Level
+from noninteract_ros.nodes.standing import FINISHED
 
 
 class StackError(NoninteractError):
@@ -125,4 +126,4 @@ class Monitor:
     def finished(self) -> bool:
         """Whether the team has come to its end."""
         team = self.status.get("robot_team")
-        return team is not None and team.text == "finished"
+        return team is not None and team.text == FINISHED

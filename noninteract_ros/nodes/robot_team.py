@@ -25,6 +25,7 @@ from noninteract_ros.nodes.messages import Level
 from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.nodes.program import run_program
 from noninteract_ros.nodes.robot_ports import RobotPorts
+from noninteract_ros.nodes.standing import FINISHED, PAUSED
 
 RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is sent again
 
@@ -257,9 +258,9 @@ class RobotTeam(ScenarioNode):
             "command age [s]": age,
         }
         if self._finished():
-            return Level.OK, "finished", values
+            return Level.OK, FINISHED, values
         if self._paused:
-            return Level.OK, "paused", values
+            return Level.OK, PAUSED, values
         if self._command_at == -np.inf:
             return Level.WARN, "waiting for the first command", values
         if self.lockstep and age > 2 * RESEND_PERIOD:

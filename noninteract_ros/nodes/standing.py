@@ -8,7 +8,9 @@ from diagnostic_msgs.msg import DiagnosticArray
 from noninteract_ros.nodes.node import DIAGNOSTICS_PERIOD, ScenarioNode
 
 TEAM = "robot_team"
-REASONS = {"paused": "the team is paused", "finished": "the team has finished"}
+# What the team says of itself then, its whole sentence.
+PAUSED, FINISHED = "paused", "finished"
+REASONS = {PAUSED: "the team is paused", FINISHED: "the team has finished"}
 SILENT = 4.0 * DIAGNOSTICS_PERIOD  # [s] after which a team that said so is believed to be gone
 
 

@@ -6,7 +6,7 @@ from std_msgs.msg import Float64MultiArray
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds
-from noninteract_ros.control.energy_account import QUANTITIES, Account
+from noninteract_ros.control.energy_account import QUANTITIES, Account, quantities
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.messages import EnergyCodec
 from noninteract_ros.nodes.node import LOOP_QOS, ScenarioNode
@@ -39,7 +39,7 @@ class TeamEnergy:
             tick: The tick.
             external_torque: tau_e as it is measured or estimated, shape (n,) [N or N m].
         """
-        now, account, tank = seconds(stamp), tick.account, tick.account.tank
+        now, account = seconds(stamp), tick.account
         force = tick.dynamics.force_of(external_torque)
         supplied = float(tick.error.e_rate @ force)
         if self._last is None or self._last[2] != account.number:
@@ -48,27 +48,8 @@ class TeamEnergy:
             before, power, _ = self._last
             self._measured += 0.5 * (now - before) * (power + supplied)
         self._last = (now, supplied, account.number)
-        values = (
-            now,
-            account.storage,
-            supplied,
-            account.dissipated,
-            account.demand,
-            tank.level,
-            tank.owed,
-            tank.reserve,
-            tank.sigma,
-            tank.grip,
-            account.residual,
-            account.received,
-            self._measured,
-            tank.brought,
-            tank.granted,
-            tank.refilled,
-            tank.lost,
-            account.number,
-        )
-        self._to.publish(self._codec.encode(np.array(values)))
+        numbers = quantities(account, supplied, self._measured)
+        self._to.publish(self._codec.encode(np.array((now, *numbers))))
 
 
 def told(account: Account) -> dict[str, object]:

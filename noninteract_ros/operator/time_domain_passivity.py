@@ -30,8 +30,7 @@ from noninteract_ros.subtasks.layout import Layout
 Limiter = Callable[[Array], Array]
 
 
-def unlimited(force: Array) -> Array:
-    """A device that can do any force, shape (p,)."""
+def _unlimited(force: Array) -> Array:
     return force
 
 
@@ -57,11 +56,10 @@ class ObservedDevice:
         settings: LinkSettings,
         metric: Array,
         period: float,
-        limited: Limiter = unlimited,
+        limited: Limiter = _unlimited,
     ) -> None:
-        self._metric, self._period, self._limited = metric, period, limited
-        self._reserve, self._filling = settings.reserve, settings.filling
-        self._kept = settings.kept
+        self._settings, self._metric = settings, metric
+        self._period, self._limited = period, limited
         observed = settings.passivity != "none"
         self.budget = Budget(0.0 if observed else math.inf, settings.capacity)
         self.port = Port()
@@ -102,16 +100,16 @@ class ObservedDevice:
         if work > 0.0:
             self.budget.level -= work
         else:
-            self._announced += self.budget.keep(-work, self._kept)
+            self._announced += self.budget.keep(-work, self._settings.kept)
         self._number += 1
         signals = motion.position, self._told(force, way, motion)
         return Packet(self._number, signals, self._announced, self.budget.level)
 
     def _wanted(self, velocity: Array) -> Array:
         """The force that would be felt if energy were no matter [N; N m]."""
-        if self._team_level >= self._reserve:
+        if self._team_level >= self._settings.reserve:
             return self._heard
-        return self._heard - self._filling * self._metric * velocity
+        return self._heard - self._settings.filling * self._metric * velocity
 
     def _told(self, force: Array, way: Array, motion: Reference) -> Array:
         """What the other end gets to know besides the position."""
@@ -157,8 +155,8 @@ class ObservedTeam:
         period: float,
         start: Reference,
     ) -> None:
-        self._layout, self._metric, self._period = layout, metric, period
-        self._bandwidth = settings.bandwidth
+        self._settings, self._layout = settings, layout
+        self._metric, self._period = metric, period
         observed = settings.passivity != "none"
         self.budget = Budget(settings.reserve if observed else math.inf, settings.capacity)
         self.port = Port()
@@ -207,7 +205,7 @@ class ObservedTeam:
     def _wanted(self, feedback: Array) -> Array:
         """Velocity one tick later of a critically damped follower of what was heard."""
         position, velocity = self._heard
-        w, T = self._bandwidth, self._period
+        w, T = self._settings.bandwidth, self._period
         away = self._layout.difference(position, self._now.position)
         pull = w * w * away + 2.0 * w * (velocity - self._now.velocity)
         return self._now.velocity + T * pull

@@ -11,35 +11,35 @@ their ports and give away no more than was announced (`time_domain_passivity.py`
 what is wanted, the account what may be.
 """
 
+from functools import cached_property
+
 import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.reference import Reference
 from noninteract_ros.operator.link_settings import LinkSettings
-from noninteract_ros.operator.time_domain_passivity import (
-    Limiter,
-    ObservedDevice,
-    ObservedTeam,
-    unlimited,
-)
-from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.operator.time_domain_passivity import ObservedDevice, ObservedTeam
 
 CATCH_UP = 2.0  # [1/s] at which a distance between the ends goes, which waves alone would keep
 
 
-class WaveDevice(ObservedDevice):
-    """The device's end: takes w, answers a velocity with f = sqrt(2 B) w - B v, tells u."""
+class _Waves:
+    """Impedance B of a connection, as its settings have it, and the root of 2 B, shape (p,)."""
 
-    def __init__(
-        self,
-        settings: LinkSettings,
-        metric: Array,
-        period: float,
-        limited: Limiter = unlimited,
-    ) -> None:
-        super().__init__(settings, metric, period, limited)
-        self._impedance = settings.impedance * metric
-        self._root = np.sqrt(2.0 * self._impedance)
+    _settings: LinkSettings
+    _metric: Array
+
+    @cached_property
+    def _impedance(self) -> Array:
+        return self._settings.impedance * self._metric
+
+    @cached_property
+    def _root(self) -> Array:
+        return np.asarray(np.sqrt(2.0 * self._impedance))
+
+
+class WaveDevice(_Waves, ObservedDevice):
+    """The device's end: takes w, answers a velocity with f = sqrt(2 B) w - B v, tells u."""
 
     def _wanted(self, velocity: Array) -> Array:
         return self._root * self._heard - self._impedance * velocity
@@ -49,24 +49,12 @@ class WaveDevice(ObservedDevice):
         return (self._impedance * (way / self._period) - force) / self._root
 
 
-class WaveTeam(ObservedTeam):
+class WaveTeam(_Waves, ObservedTeam):
     """The team's end: takes u, answers a force with v = (sqrt(2 B) u - F) / B, tells w.
 
     The answer is smoothed with the link's bandwidth, since the force follows it at once through
     the damping. A position that was sent along is caught up with.
     """
-
-    def __init__(
-        self,
-        settings: LinkSettings,
-        layout: Layout,
-        metric: Array,
-        period: float,
-        start: Reference,
-    ) -> None:
-        self._impedance = settings.impedance * metric
-        self._root = np.sqrt(2.0 * self._impedance)
-        super().__init__(settings, layout, metric, period, start)
 
     def resume(self, start: Reference) -> None:
         """Starts from where the device is now, without a wave under way."""
@@ -76,7 +64,8 @@ class WaveTeam(ObservedTeam):
         position, wave = self._heard
         away = self._layout.difference(position, self._now.position)
         goal = (self._root * wave + feedback) / self._impedance + CATCH_UP * away
-        return self._now.velocity + self._period * self._bandwidth * (goal - self._now.velocity)
+        share = self._period * self._settings.bandwidth
+        return self._now.velocity + share * (goal - self._now.velocity)
 
     def _told(self, feedback: Array) -> Array:
         return (self._impedance * self._now.velocity + feedback) / self._root

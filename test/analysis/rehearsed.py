@@ -13,7 +13,7 @@ from rclpy.serialization import serialize_message
 from noninteract_ros.analysis.recording import RunWriter
 from noninteract_ros.analysis.run import Run
 from noninteract_ros.clock import stamp, tick_stamp
-from noninteract_ros.control.energy_account import QUANTITIES
+from noninteract_ros.control.energy_account import QUANTITIES, quantities
 from noninteract_ros.control.safety_watch import SafetyWatch
 from noninteract_ros.control.subtask_account import LABELS, rows
 from noninteract_ros.nodes.cdr import JointStateCodec
@@ -204,14 +204,9 @@ class _Recording:
 
     def _tell_account(self, now: int, tick: Any, external: np.ndarray) -> None:
         """What the controller tells of the port where the team is touched."""
-        account, tank = tick.account, tick.account.tank
         supplied = float(tick.error.e_rate @ tick.dynamics.force_of(external))
         self._measured += supplied * self._period / self._rate
-        values = (
-            now / 1e9, account.storage, supplied, account.dissipated, account.demand, tank.level,
-            tank.owed, tank.reserve, tank.sigma, tank.grip, account.residual, account.received,
-            self._measured, tank.brought, tank.granted, tank.refilled, tank.lost, account.number,
-        )  # fmt: skip
+        values = now / 1e9, *quantities(tick.account, supplied, self._measured)
         self._add("energy", LABELLED, now, self._account.encode, np.array(values, dtype=float))
 
 
