@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 METADATA := setup.py setup.cfg pyproject.toml
 PIP_INSTALL = $(BIN)/python -m pip install --quiet --disable-pip-version-check
 # Otherwise the first controller does it, while others wait for it.
-COMPILE = $(BIN)/python -m noninteract_ros.control.compile_ahead
+COMPILE = $(BIN)/python -m noninteract_ros.control.fast.compile_ahead
 
 # Discovery never leaves this machine, and small matrices gain nothing from more threads.
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST

@@ -6,18 +6,18 @@ from glob import glob
 from setuptools import find_packages, setup
 
 NAME = "noninteract_ros"
-NODES = (
-    "robot_team",
-    "haptic_emulator",
-    "relative_planner",
-    "controller",
-    "operator_console",
-    "joy_operator",
-    "pose_operator",
-    "keyboard_operator",
-    "recorder",
-)
-PROGRAMS = {node: f"{NAME}.nodes.{node}:main" for node in NODES}
+NODES = {
+    "robot_team": "team",
+    "haptic_emulator": "sources",
+    "relative_planner": "sources",
+    "controller": "controller",
+    "operator_console": "console",
+    "joy_operator": "sources",
+    "pose_operator": "sources",
+    "keyboard_operator": "sources",
+    "recorder": "recording",
+}
+PROGRAMS = {node: f"{NAME}.nodes.{room}.{node}:main" for node, room in NODES.items()}
 PROGRAMS["noninteract"] = f"{NAME}.cli:main"
 ROBOTS = ["example-robot-data>=6.0"]  # Models of arms: 130 MB to download, 440 MB on disk.
 PEER = ["mujoco>=4.0"]  # Another simulator's dynamics, to test against: 20 MB to download.

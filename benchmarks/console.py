@@ -25,7 +25,7 @@ import rclpy
 from playwright.sync_api import Page, sync_playwright
 from rclpy.node import Node
 
-from noninteract_ros.nodes.feed import Feed
+from noninteract_ros.nodes.recording.feed import RawSubscription
 
 DRAGS = 20
 WATCHED = 10.0  # [s] over which processor time is counted
@@ -74,7 +74,7 @@ def console_process() -> int:
                 words = (entry / "cmdline").read_bytes().split(b"\0")
             except OSError:
                 continue
-            if b"noninteract_ros.nodes.operator_console" in words:
+            if b"operator_console" in words:
                 return int(entry.name)
     raise SystemExit("there is no console")
 
@@ -85,7 +85,7 @@ def processor_time(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def latency(page: Page, feed: Feed) -> float:
+def latency(page: Page, feed: RawSubscription) -> float:
     """Time from a motion of the mouse to the first reference that follows it [ms]."""
     heard: list[tuple[int, bytes]] = []
 
@@ -112,7 +112,7 @@ def latency(page: Page, feed: Feed) -> float:
     return 1e-6 * (at - moved)
 
 
-def measure(page: Page, feed: Feed, pid: int) -> None:
+def measure(page: Page, feed: RawSubscription, pid: int) -> None:
     """Prints all figures."""
     before, began = processor_time(pid), time.monotonic()
     frames, rates = [], []
@@ -160,7 +160,7 @@ def main() -> None:
         kind = "trajectory_msgs/msg/MultiDOFJointTrajectory"
         driven = page.input_value("#what").split("/")[0]
         topic = f"/team/{driven}/human/reference"
-        feed = Feed(node, topic, kind)
+        feed = RawSubscription(node, topic, kind)
         measure(page, feed, console_process())
         browser.close()
         node.destroy_node()

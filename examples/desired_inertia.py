@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from noninteract_ros.control.decoupling import (
+from noninteract_ros.control.law.decoupling import (
     TaskDynamics,
     TaskError,
     commanded_acceleration,
     task_dynamics,
 )
-from noninteract_ros.control.impedance import stack_impedance
-from noninteract_ros.scenario_file import find_scenario, load_scenario
+from noninteract_ros.control.law.impedance import stack_impedance
+from noninteract_ros.scenario.files import find_scenario, load_scenario
 
 FORCE = np.array([6.0, 0.0, 0.0, 0.0])  # N, along x on the cooperative subtask
 PUSH = np.array([6.0, 0.0, 0.0, 0.0])  # N, along x on robot_1

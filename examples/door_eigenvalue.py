@@ -3,11 +3,11 @@
 
 import numpy as np
 
-from noninteract_ros.control.decoupling import TaskDynamics, task_dynamics
-from noninteract_ros.subtasks.cooperative_position import CooperativePosition
-from noninteract_ros.subtasks.relative_position import RelativePosition
+from noninteract_ros.control.law.decoupling import TaskDynamics, task_dynamics
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
 from noninteract_ros.subtasks.stack import SubtaskStack
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team
 
 MASSES = (1.0, 4.0)  # kg, one axis each

@@ -3,9 +3,9 @@
 
 import numpy as np
 
-from noninteract_ros.rehearsal import rehearse
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import find_scenario, read_parameters
+from noninteract_ros.scenario.files import find_scenario, read_parameters
+from noninteract_ros.scenario.rehearsal import rehearse
 
 DURATION = 2.0  # s
 RATES = (250.0, 500.0, 1000.0)  # Hz

@@ -18,8 +18,8 @@ from rclpy.node import Node
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
-from noninteract_ros.scenario_file import find_scenario, read_parameters
-from noninteract_ros.team.urdf_files import read_urdf
+from noninteract_ros.scenario.files import find_scenario, read_parameters
+from noninteract_ros.team.models.urdf_files import read_urdf
 
 SUBSTEPS = 2  # of MuJoCo in a tick
 RESEND = 0.2  # [s] after which a state that nobody has answered is sent again

@@ -3,9 +3,9 @@
 
 import numpy as np
 
-from noninteract_ros.rehearsal import rehearse
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import find_scenario, read_parameters
+from noninteract_ros.scenario.files import find_scenario, read_parameters
+from noninteract_ros.scenario.rehearsal import rehearse
 
 DURATION = 3.0  # s
 CHANGES = {"rate": 500.0, "haptic": {"subtask": "cooperative", "start_time": 1.0}}

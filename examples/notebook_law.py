@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from noninteract_ros.control.inputs import Target
+from noninteract_ros.control.references.inputs import Target
 from noninteract_ros.scenario import Scenario
 
 gains = {"stiffness": [50.0], "damping": [30.0]}

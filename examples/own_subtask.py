@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from noninteract_ros.control.inputs import Target
+from noninteract_ros.control.references.inputs import Target
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.schema import key
-from noninteract_ros.subtasks.registry import register_kind
+from noninteract_ros.subtasks.kinds.registry import register_kind
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.team import Team, TeamState
 

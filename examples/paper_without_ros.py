@@ -4,9 +4,9 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from noninteract_ros.rehearsal import History, rehearse
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import find_scenario, read_parameters
+from noninteract_ros.scenario.files import find_scenario, read_parameters
+from noninteract_ros.scenario.rehearsal import History, rehearse
 
 DURATION, START = 6.0, 4.0  # s; the human leads from START on
 RATES = (250.0, 500.0, 1000.0)  # Hz

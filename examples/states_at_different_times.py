@@ -5,10 +5,10 @@ from collections import deque
 
 import numpy as np
 
-from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import find_scenario, read_parameters
-from noninteract_ros.team.assembler import PREDICTIONS, StateAssembler
+from noninteract_ros.scenario.files import find_scenario, read_parameters
+from noninteract_ros.scenario.rehearsal import Rehearsal
+from noninteract_ros.team.state_assembler import PREDICTIONS, StateAssembler
 
 DURATION = 2.5  # s
 AGES = (0, 1, 2, 3)  # ms by which the states of the second robot are older

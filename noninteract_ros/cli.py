@@ -71,8 +71,8 @@ def demo(
     port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the console.")] = 8090,
 ) -> int:
     """Run a scenario on the full stack, record it, check it and draw it."""
-    from noninteract_ros.nodes.run_file import prepare
-    from noninteract_ros.scenario_file import find_scenario
+    from noninteract_ros.nodes.stack.run_file import prepare
+    from noninteract_ros.scenario.files import find_scenario
 
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     source = find_scenario(scenario)
@@ -94,9 +94,9 @@ def _lead(
     source: Path, folder: Path, duration: float | None, rate_factor: float, port: int
 ) -> int:
     """Runs a scenario in real time with the console, which speaks for the human."""
-    from noninteract_ros.nodes.demo import run_with_console
-    from noninteract_ros.nodes.run_file import prepare
-    from noninteract_ros.scenario_file import for_console, read_parameters
+    from noninteract_ros.nodes.stack.demo import run_with_console
+    from noninteract_ros.nodes.stack.run_file import prepare
+    from noninteract_ros.scenario.files import for_console, read_parameters
 
     values = for_console(read_parameters(source), port)
     file = prepare(source, folder.resolve(), duration, rate_factor, values)
@@ -120,8 +120,8 @@ def _keeping(folder: Path) -> Iterator[None]:
 
 def _run(file: Path, folder: Path, in_process: bool) -> bool:
     """Runs the stack under a progress bar; returns whether the user ended it."""
-    from noninteract_ros.nodes.demo import run_demo
-    from noninteract_ros.scenario_file import load_scenario
+    from noninteract_ros.nodes.stack.demo import run_demo
+    from noninteract_ros.scenario.files import load_scenario
 
     end = load_scenario(file).general.end_time
     columns = (
@@ -156,7 +156,8 @@ def report(
 
 
 def _report(run: Path, out: Path | None, compare_laws: bool = False) -> int:
-    from noninteract_ros.analysis.report import summary, tables, write_report
+    from noninteract_ros.reporting.report.report import write_report
+    from noninteract_ros.reporting.report.tables import summary, tables
 
     with console.status("computing metrics, drawing figures"):
         made = write_report(run, out, compare=compare_laws)
@@ -175,7 +176,7 @@ def repair(
     out: Annotated[Path | None, typer.Option(help="Where to write; by default in place.")] = None,
 ) -> int:
     """Make a recording readable again after its recorder was killed."""
-    from noninteract_ros.analysis.repair import repair as repair_file
+    from noninteract_ros.reporting.recording.repair import repair as repair_file
 
     console.print(str(repair_file(file, out)))
     return 0
@@ -213,9 +214,8 @@ def check(
     ] = None,
 ) -> int:
     """Check a scenario, and the law on its team, without running it."""
-    from noninteract_ros.analysis.check import run_check
-    from noninteract_ros.analysis.check_report import CheckSettings
-    from noninteract_ros.analysis.gauntlet.settings import GauntletSettings
+    from noninteract_ros.validation.check import CheckSettings, run_check
+    from noninteract_ros.validation.gauntlet.settings import GauntletSettings
 
     options = {"cases": cases, "delay": delay, "drop": drop, "rate": rate, "horizon": horizon}
     given: dict[str, Any] = {name: item for name, item in options.items() if item is not None}
@@ -250,13 +250,13 @@ def bench(
     json_file: Annotated[Path | None, typer.Option("--json", help="Also write JSON.")] = None,
 ) -> int:
     """Measure the law, the controller and the lockstep, each beside its floor."""
-    from noninteract_ros.analysis import bench as measures
+    from noninteract_ros.validation.benchmarks import bench as measures
 
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     for name in part or ():
         if name not in measures.PARTS:
             raise ScenarioError("--part", name, one_of(measures.PARTS, name))
-    from noninteract_ros.nodes.bench import measure
+    from noninteract_ros.nodes.bench.bench import measure
 
     settings = measures.BenchSettings(ticks, rounds, seconds)
     machine = measures.machine()
@@ -277,9 +277,9 @@ def describe(
     timeout: Annotated[float, typer.Option(help="Time to wait for descriptions [s].")] = 10.0,
 ) -> int:
     """Write a scenario with the robots' descriptions in place of the topics they come on."""
-    from noninteract_ros.nodes.describe import described
-    from noninteract_ros.nodes.parameter_files import write
-    from noninteract_ros.scenario_file import find_scenario, load_scenario, read_parameters
+    from noninteract_ros.nodes.common.parameter_files import write
+    from noninteract_ros.nodes.stack.describe import described
+    from noninteract_ros.scenario.files import find_scenario, load_scenario, read_parameters
 
     os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     values = described(read_parameters(find_scenario(scenario)), timeout)

@@ -23,8 +23,8 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     Also removes what programs that earlier tests have killed left in shared memory.
     """
     if not hasattr(session.config, "workerinput"):
-        from noninteract_ros.control.compile_ahead import compile_ahead
-        from noninteract_ros.nodes.shared_memory import remove_abandoned
+        from noninteract_ros.control.fast.compile_ahead import compile_ahead
+        from noninteract_ros.nodes.stack.shared_memory import remove_abandoned
 
         compile_ahead()
         remove_abandoned()

@@ -23,15 +23,15 @@ from std_srvs.srv import SetBool
 from waiting import WITNESSES, until
 
 from noninteract_ros.clock import seconds
-from noninteract_ros.nodes.cdr import JointArrays, JointStateCodec
-from noninteract_ros.nodes.controller import Controller
-from noninteract_ros.nodes.haptic_emulator import HapticEmulator
-from noninteract_ros.nodes.node import ScenarioNode, spin
-from noninteract_ros.nodes.program import until_shutdown
-from noninteract_ros.nodes.relative_planner import RelativePlanner
-from noninteract_ros.nodes.robot_team import RobotTeam
+from noninteract_ros.nodes.common.node import ScenarioNode, spin
+from noninteract_ros.nodes.common.program import until_shutdown
+from noninteract_ros.nodes.controller.controller import Controller
+from noninteract_ros.nodes.messages.cdr import JointArrays, JointStateCodec
+from noninteract_ros.nodes.sources.haptic_emulator import HapticEmulator
+from noninteract_ros.nodes.sources.relative_planner import RelativePlanner
+from noninteract_ros.nodes.team.robot_team import RobotTeam
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
 
 DEEP = QoSProfile(depth=20000)
 NODES: dict[str, Callable[..., ScenarioNode]] = {

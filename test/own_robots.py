@@ -14,9 +14,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 
-from noninteract_ros.nodes.controller import Controller
+from noninteract_ros.nodes.controller.controller import Controller
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
 from noninteract_ros.simulation.team_simulation import TeamSimulation
 
 WIRING = (

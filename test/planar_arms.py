@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
-from noninteract_ros.subtasks.mixed_position import MixedPosition
+from noninteract_ros.subtasks.kinds.mixed_position import MixedPosition
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.team import TeamState

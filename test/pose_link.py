@@ -6,7 +6,7 @@ from typing import Any
 from harness import merged
 from repository import ROOT
 
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
 
 HAPTIC = {
     "start_time": 0.1,

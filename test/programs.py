@@ -13,7 +13,7 @@ from harness import Ear
 from repository import ROOT
 from waiting import DEADLINE, WITNESSES, until
 
-from noninteract_ros.nodes.parameter_files import write
+from noninteract_ros.nodes.common.parameter_files import write
 
 
 class Programs:
@@ -38,7 +38,7 @@ class Programs:
     def start(self, name: str, values: Mapping[str, Any]) -> subprocess.Popen[str]:
         """One of the stack's programs, with a scenario."""
         parameters = ["--ros-args", "--params-file", str(self.write(values))]
-        return self.python(name, "-m", f"noninteract_ros.nodes.{name}", *parameters)
+        return self.python(name, "-m", "noninteract_ros.nodes", name, *parameters)
 
     def write(self, values: Mapping[str, Any]) -> Path:
         """A scenario's file."""

@@ -3,47 +3,50 @@
 
 import ast
 import xml.etree.ElementTree as ElementTree
+from collections import Counter
 from collections.abc import Iterator
 
 import pytest
-from repository import PACKAGE, ROOT, distribution, programs
+import structure
+from repository import ROOT, distribution, programs
 
 import noninteract_ros
+from noninteract_ros.nodes import PROGRAMS
 
 ROS_MODULES = ("rclpy", "builtin_interfaces", "rcl_interfaces", "std_srvs", "ament_index_python")
 
-# What each part must not import: whatever stands above it. "" are the modules beside the parts.
-ABOVE = {
-    "team": {
-        "subtasks",
-        "control",
-        "simulation",
-        "operator",
-        "console",
-        "analysis",
-        "nodes",
-        "cli",
-    },
-    "subtasks": {"control", "simulation", "operator", "console", "analysis", "nodes", "cli"},
-    "control": {"simulation", "operator", "console", "analysis", "nodes", "cli"},
-    "simulation": {"console", "analysis", "nodes", "cli"},
-    "operator": {"console", "analysis", "nodes", "cli"},
-    "console": {"nodes", "cli"},
-    "analysis": {"console", "nodes", "cli"},
-    "nodes": {"cli"},
-    "": {"analysis", "nodes", "cli"},
-}
+# Floors from the ground up: a folder imports from its own floor's own folder and from below.
+FLOORS: tuple[tuple[str, ...], ...] = (
+    ("arrays", "clock", "errors", "memo", ""),
+    ("schema",),
+    ("team",),
+    ("subtasks",),
+    ("control",),
+    ("sources", "simulation"),
+    ("scenario",),
+    ("console",),
+    ("reporting",),
+    ("validation",),
+    ("nodes",),
+    ("cli",),
+)
+FLOOR = {part: number for number, parts in enumerate(FLOORS) for part in parts}
+FILES = structure.modules()
+GRAPH = structure.import_graph(FILES)
+CROWDED = 16  # files in a folder, its __init__.py included
 
 
-def imported_modules(tree: ast.AST, package: list[str]) -> Iterator[str]:
-    """Dotted names of all that is imported anywhere under `tree`."""
+def ros_modules(tree: ast.AST) -> Iterator[str]:
+    """Names of ROS modules that are imported anywhere under `tree`."""
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) - node.level + 1] if node.level else []
-            module = ".".join([*base, *([node.module] if node.module else [])])
-            yield from (f"{module}.{alias.name}" for alias in node.names)
+            names = [node.module or ""]
+        else:
+            continue
+        roots = [name.partition(".")[0] for name in names]
+        yield from (root for root in roots if root in ROS_MODULES or root.endswith("_msgs"))
 
 
 class WithoutFunctions(ast.NodeTransformer):
@@ -53,74 +56,101 @@ class WithoutFunctions(ast.NodeTransformer):
         """Takes the function out."""
 
 
-def violations(path: str, source: str) -> list[str]:
-    """The imports that the module at `path` (relative to the package) must not make."""
-    package = path.split("/")[:-1]
+def violations(module: str, source: str) -> list[str]:
+    """The imports that a module (dotted, below the package) must not make."""
     tree = ast.parse(source)
-    if path == "cli.py":
-        part, forbidden = "cli", {"nodes"}
+    part = module.partition(".")[0]
+    if part == "cli":
         tree = WithoutFunctions().visit(tree)
-    else:
-        part = package[0] if package else ""
-        forbidden = ABOVE[part]
-    found = []
-    for name in imported_modules(tree, [PACKAGE, *package]):
-        root, *rest = name.split(".")
-        ros = root in ROS_MODULES or root.endswith("_msgs")
-        upwards = root == PACKAGE and rest and rest[0] in forbidden
-        if (ros and part != "nodes") or upwards:
-            found.append(f"{path} imports {name}")
+    found = [f"{module} imports {name}" for name in ros_modules(tree) if part != "nodes"]
+    for name in structure.imported(tree, FILES):
+        other = name.partition(".")[0]
+        lazy_program = part == "cli" and other == "nodes"
+        if lazy_program or (FLOOR[other] >= FLOOR[part] and other != part):
+            found.append(f"{module} imports {name}")
     return found
 
 
 def test_only_nodes_import_ros_and_nothing_imports_upwards() -> None:
     """Each module imports only what stands below it, and ROS only in nodes (cli: when called)."""
-    sources = ROOT / PACKAGE
-    found = [
-        line
-        for file in sorted(sources.rglob("*.py"))
-        for line in violations(file.relative_to(sources).as_posix(), file.read_text())
-    ]
+    found = [line for name, file in FILES.items() for line in violations(name, file.read_text())]
     assert found == []
 
 
 @pytest.mark.parametrize(
-    ("path", "source"),
+    ("module", "source"),
     [
-        ("control/law.py", "import rclpy"),
-        ("team/team.py", "from geometry_msgs.msg import Pose"),
-        ("schema.py", "def read():\n    from rclpy.node import Node"),
-        ("team/team.py", "from noninteract_ros.subtasks import stack"),
-        ("team/team.py", "from ..subtasks import stack"),
-        ("subtasks/stack.py", "from noninteract_ros import control"),
-        ("simulation/object.py", "from noninteract_ros.nodes.messages import to_array"),
-        ("nodes/controller.py", "import noninteract_ros.cli"),
-        ("cli.py", "import rclpy"),
-        ("cli.py", "from noninteract_ros.nodes.recorder import main"),
+        ("control.law.natural", "import rclpy"),
+        ("team.team", "from geometry_msgs.msg import Pose"),
+        ("schema", "def read():\n    from rclpy.node import Node"),
+        ("team.team", "from noninteract_ros.subtasks import stack"),
+        ("subtasks.stack", "from noninteract_ros.control import controller"),
+        ("simulation.plant", "from noninteract_ros.nodes.messages.messages import to_array"),
+        ("simulation.plant", "from noninteract_ros.sources import port"),
+        ("nodes.controller.controller", "import noninteract_ros.cli"),
+        ("cli", "import rclpy"),
+        ("cli", "from noninteract_ros.nodes.recording.recorder import main"),
     ],
 )
-def test_a_forbidden_import_is_found(path: str, source: str) -> None:
+def test_a_forbidden_import_is_found(module: str, source: str) -> None:
     """The check above reports each kind of forbidden import."""
-    assert len(violations(path, source)) == 1
+    assert len(violations(module, source)) == 1
 
 
 @pytest.mark.parametrize(
-    ("path", "source"),
+    ("module", "source"),
     [
-        ("control/law.py", "from noninteract_ros.subtasks.stack import Stack"),
-        ("nodes/controller.py", "import rclpy\nfrom noninteract_ros.control import law"),
-        ("cli.py", "def demo():\n    import rclpy"),
+        ("control.law.natural", "from noninteract_ros.subtasks.stack import SubtaskStack"),
+        (
+            "nodes.controller.controller",
+            "import rclpy\nfrom noninteract_ros.control import controller",
+        ),
+        ("cli", "def demo():\n    import rclpy"),
     ],
 )
-def test_an_allowed_import_is_not_reported(path: str, source: str) -> None:
+def test_an_allowed_import_is_not_reported(module: str, source: str) -> None:
     """The check above leaves downward and lazy imports alone."""
-    assert violations(path, source) == []
+    assert violations(module, source) == []
+
+
+def test_no_imports_in_a_circle() -> None:
+    """Neither files nor folders import each other in a circle."""
+    assert structure.cycles(GRAPH) == []
+    assert structure.cycles(structure.folder_graph(GRAPH, FILES)) == []
+
+
+def test_a_circle_is_found() -> None:
+    """The check above finds a circle over three nodes, and only the nodes on it."""
+    assert structure.cycles({"a": {"b"}, "b": {"c"}, "c": {"a", "d"}, "d": set()}) == [
+        ["a", "b", "c"]
+    ]
+
+
+def test_no_program_imports_what_only_validates() -> None:
+    """What checks the law before anything moves is loaded by no program of a run."""
+    for program in PROGRAMS.values():
+        reached = structure.closure(GRAPH, f"nodes.{program}")
+        assert {name for name in reached if name.startswith("validation")} == set()
+
+
+def test_each_folder_is_small_and_says_what_it_is_for() -> None:
+    """Every folder has at most fifteen modules and a sentence at its top."""
+    counts = Counter(structure.folder_of(name, FILES) for name in FILES)
+    assert {name: count for name, count in counts.items() if count > CROWDED} == {}
+    folders = [file for file in FILES.values() if file.name == "__init__.py"]
+    assert [file for file in folders if not ast.get_docstring(ast.parse(file.read_text()))] == []
 
 
 def test_version_is_the_same_everywhere() -> None:
     """package.xml, setup.py and the module name one version."""
     manifest = ElementTree.parse(ROOT / "package.xml").findtext("version")
     assert manifest == distribution().get_version() == noninteract_ros.__version__
+
+
+def test_each_program_can_be_started_by_its_name() -> None:
+    """`python -m noninteract_ros.nodes` knows the programs of setup.py's entry points."""
+    known = {name: f"noninteract_ros.nodes.{path}:main" for name, path in PROGRAMS.items()}
+    assert known == {name: main for name, main in programs().items() if name != "noninteract"}
 
 
 def test_each_program_has_its_script() -> None:

@@ -8,13 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.console.held import Drag, Held, Push
-from noninteract_ros.control.desired import DesiredMotion
-from noninteract_ros.control.inputs import Motion, Rate, Target
-from noninteract_ros.control.reference import Reference
-from noninteract_ros.operator.input_shaping import Workspace
+from noninteract_ros.console.page_input import Held, PageDrag, PagePush
+from noninteract_ros.control.references.desired_motion import DesiredMotion
+from noninteract_ros.control.references.inputs import MotionInput, Rate, Target
+from noninteract_ros.sources.human.input_shaping import Workspace
 from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.reference import Reference
 
 NO_TURN = np.array([0.0, 0.0, 0.0, 1.0])
 AXES = ("x", "y", "z")
@@ -60,7 +60,7 @@ class Drivable:
 
 
 @dataclass(frozen=True, slots=True)
-class Scene:
+class DriveState:
     """What the console knows of the team now.
 
     Attributes:
@@ -74,7 +74,7 @@ class Scene:
     led: frozenset[str]
 
 
-class Lead:
+class DrivenMotion:
     """The motion of one subtask while it is driven, and until it has come to rest."""
 
     def __init__(self, subtask: Drivable, start: Array) -> None:
@@ -100,9 +100,9 @@ class Lead:
         self._words = LAST_WORDS if held or moves else self._words - 1
         return reference
 
-    def _motion(self, held: Held | None, anchor: Array, frame: Array) -> Motion | None:
+    def _motion(self, held: Held | None, anchor: Array, frame: Array) -> MotionInput | None:
         box = self._subtask.workspace
-        if isinstance(held, Push):
+        if isinstance(held, PagePush):
             rate = self._rate(held, frame)
             return Rate(box.rate(rate, self._desired.now) if box else rate)
         if held is None:
@@ -111,7 +111,7 @@ class Lead:
         still = np.zeros(self._subtask.layout.dim)
         return Target(box.place(target) if box else target, still)
 
-    def _rate(self, held: Push, frame: Array) -> Array:
+    def _rate(self, held: PagePush, frame: Array) -> Array:
         subtask, to_frame = self._subtask, so3.matrix(so3.inverse(frame))
         velocity = np.zeros(subtask.layout.dim)
         linear = (subtask.speed * to_frame @ held.linear)[_places(subtask)]
@@ -120,7 +120,7 @@ class Lead:
         velocity[subtask.rate_part(held.element)] = part
         return velocity
 
-    def _target(self, held: Drag, anchor: Array, frame: Array) -> Array:
+    def _target(self, held: PageDrag, anchor: Array, frame: Array) -> Array:
         subtask, back = self._subtask, so3.inverse(frame)
         value, part = anchor.copy(), subtask.value_part(held.element)
         by = (so3.matrix(back) @ held.by)[_places(subtask)]
@@ -141,7 +141,7 @@ class Drive:
 
     def __init__(self, subtasks: Mapping[str, Drivable]) -> None:
         self._subtasks = subtasks
-        self._leads: dict[str, Lead] = {}
+        self._leads: dict[str, DrivenMotion] = {}
         # Where the last grab began: a drag that goes on after a gap goes to the same place.
         self._grab = -1
         self._anchor: Array = np.zeros(0)
@@ -155,7 +155,7 @@ class Drive:
         """Forgets all motions: the controller brings the team to rest by itself."""
         self._leads.clear()
 
-    def step(self, held: Held | None, scene: Scene, step: float) -> dict[str, Reference]:
+    def step(self, held: Held | None, scene: DriveState, step: float) -> dict[str, Reference]:
         """References to be said now, by subtask.
 
         Args:
@@ -168,7 +168,7 @@ class Drive:
         if held is not None and held.subtask in scene.led and held.subtask not in self._leads:
             start = scene.desired.get(held.subtask)
             if start is not None:
-                self._leads[held.subtask] = Lead(self._subtasks[held.subtask], start)
+                self._leads[held.subtask] = DrivenMotion(self._subtasks[held.subtask], start)
         references = {}
         for name, lead in list(self._leads.items()):
             holding = held if held is not None and held.subtask == name else None

@@ -8,12 +8,12 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.console.drive import AXES, NO_TURN, Drivable
-from noninteract_ros.control.impedance import spread
-from noninteract_ros.operator.input_settings import OperatorSettings
-from noninteract_ros.operator.input_shaping import Workspace
+from noninteract_ros.control.law.impedance import spread
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.subtasks.elbow_angle import ElbowAngles
-from noninteract_ros.subtasks.posture import JointSelection
+from noninteract_ros.sources.human.input_settings import OperatorSettings
+from noninteract_ros.sources.human.input_shaping import Workspace
+from noninteract_ros.subtasks.kinds.elbow_angle import ElbowAngles
+from noninteract_ros.subtasks.kinds.posture import JointSelection
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.team import Team

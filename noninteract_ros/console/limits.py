@@ -2,7 +2,7 @@
 """How much a page may send."""
 
 
-class Allowance:
+class RateLimit:
     """Grants messages at a rate, and as many at once as come together in one second.
 
     Args:

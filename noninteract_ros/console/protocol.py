@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from noninteract_ros.console.held import Drag, Held, Push
+from noninteract_ros.console.page_input import Held, PageDrag, PagePush
 from noninteract_ros.errors import InputError
 from noninteract_ros.subtasks.layout import UNIT_TOLERANCE
 
@@ -95,7 +95,7 @@ KINDS: dict[str, dict[str, Check]] = {
 
 
 @dataclass(frozen=True, slots=True)
-class Said:
+class PageCommand:
     """A message that has the right form.
 
     Attributes:
@@ -107,7 +107,7 @@ class Said:
     values: Mapping[str, Any]
 
 
-def parse(data: str | bytes) -> Said:
+def parse(data: str | bytes) -> PageCommand:
     """A page's message.
 
     Raises:
@@ -130,21 +130,21 @@ def parse(data: str | bytes) -> Said:
     for name, check in checks.items():
         if not check(content[name]):
             raise InputError(f"{kind} with a wrong {name}")
-    return Said(kind, content)
+    return PageCommand(kind, content)
 
 
-def held(said: Said) -> Held | None:
+def held(said: PageCommand) -> Held | None:
     """What a message says is held; None where it says something else."""
     values = said.values
     if said.kind == "drag":
         turn = np.array(values["turn"], dtype=float)
         by = np.array(values["by"], dtype=float)
         unit = turn / np.linalg.norm(turn)
-        return Drag(values["subtask"], values["element"], values["grab"], by, unit)
+        return PageDrag(values["subtask"], values["element"], values["grab"], by, unit)
     if said.kind == "push":
         linear = np.array(values["linear"], dtype=float)
         angular = np.array(values["angular"], dtype=float)
-        return Push(values["subtask"], values["element"], values["grab"], linear, angular)
+        return PagePush(values["subtask"], values["element"], values["grab"], linear, angular)
     return None
 
 

@@ -18,13 +18,13 @@ from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
-from noninteract_ros.console.held import Held
-from noninteract_ros.console.limits import Allowance
-from noninteract_ros.console.protocol import VERSION, Said, held, parse
-from noninteract_ros.console.seat import Seat
-from noninteract_ros.console.settings import ConsoleSettings
-from noninteract_ros.console.site import HEADERS, Doorkeeper, load_site
+from noninteract_ros.console.driver_lock import DriverLock
+from noninteract_ros.console.limits import RateLimit
+from noninteract_ros.console.page_input import Held
+from noninteract_ros.console.protocol import VERSION, PageCommand, held, parse
+from noninteract_ros.console.site import HEADERS, AccessPolicy, load_site
 from noninteract_ros.errors import InputError, ScenarioError
+from noninteract_ros.scenario.console_settings import ConsoleSettings
 
 SOCKET = "/socket"
 HELLO_TIMEOUT = 3.0  # [s] given to a page to say who it is
@@ -53,7 +53,7 @@ class Host(Protocol):
     def knows(self, item: Held) -> bool:
         """Whether there is such a thing to hold."""
 
-    def command(self, page: int, said: Said) -> None:
+    def command(self, page: int, said: PageCommand) -> None:
         """A page asks for something; what comes of it is told later."""
 
 
@@ -69,7 +69,7 @@ class Page:
 
     number: int
     socket: ServerConnection
-    allowance: Allowance = field(repr=False)
+    allowance: RateLimit = field(repr=False)
 
 
 class ConsoleServer:
@@ -82,10 +82,12 @@ class ConsoleServer:
         host: What is served.
     """
 
-    def __init__(self, settings: ConsoleSettings, token: str, seat: Seat, host: Host) -> None:
+    def __init__(
+        self, settings: ConsoleSettings, token: str, seat: DriverLock, host: Host
+    ) -> None:
         self._settings, self._token, self._seat, self._host = settings, token, seat, host
         self._site = load_site()
-        self._door = Doorkeeper(settings)
+        self._door = AccessPolicy(settings)
         self._pages: dict[int, Page] = {}
         self._sockets = self._next = 0
         self._loop = asyncio.new_event_loop()
@@ -214,7 +216,7 @@ class ConsoleServer:
 
     async def _attend(self, socket: ServerConnection) -> None:
         self._next += 1
-        page = Page(self._next, socket, Allowance(self._settings.max_message_rate))
+        page = Page(self._next, socket, RateLimit(self._settings.max_message_rate))
         for item in self._host.greeting():
             await socket.send(item)
         await socket.send(json.dumps({"kind": "you", "page": page.number}))
@@ -248,7 +250,7 @@ class ConsoleServer:
             self._obey(page, said, now)
         return ""
 
-    def _obey(self, page: Page, said: Said, now: float) -> None:
+    def _obey(self, page: Page, said: PageCommand, now: float) -> None:
         number = page.number
         if said.kind == "release":
             self._seat.release(number)

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from noninteract_ros.analysis.shapes import Shape, shapes_of
 from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario.shapes import Shape, shapes_of
 from noninteract_ros.simulation.plant import Plant
 
 SMALLEST = 0.6  # [m] radius of a team, so that point masses that stand together can be seen

@@ -4,7 +4,7 @@
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from noninteract_ros.console.settings import ConsoleSettings
+from noninteract_ros.scenario.console_settings import ConsoleSettings
 
 STATIC = Path(__file__).parent / "static"
 KINDS = {
@@ -38,7 +38,7 @@ def load_site(folder: Path = STATIC) -> dict[str, tuple[str, bytes]]:
     return files
 
 
-class Doorkeeper:
+class AccessPolicy:
     """Says whose requests are answered.
 
     A page of another origin may be open in the same browser: it must not reach the console, be it

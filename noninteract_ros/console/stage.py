@@ -14,8 +14,8 @@ from noninteract_ros.console.handles import WORLD, Handles, rotation_of
 from noninteract_ros.console.protocol import VERSION
 from noninteract_ros.console.shapes import described, mesh_bytes, team_shapes
 from noninteract_ros.console.surroundings import edges, walls
-from noninteract_ros.console.view import TeamView
-from noninteract_ros.control.decoupling import LAWS
+from noninteract_ros.console.view import SceneState
+from noninteract_ros.control.law.decoupling import LAWS
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
@@ -35,7 +35,7 @@ class Stage:
 
     def __init__(self, scenario: Scenario, team: Team, stack: SubtaskStack) -> None:
         self._scenario, self._team, self._stack = scenario, team, stack
-        self._view = TeamView(team, stack)
+        self._view = SceneState(team, stack)
         self._handles = {task.name: Handles.of(task, scenario, team) for task in stack.subtasks}
         plant = scenario.build_simulation(team, stack).plant
         shapes = team_shapes(scenario, plant)

@@ -5,7 +5,7 @@ from typing import Any
 
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.simulation.environment import Wall
-from noninteract_ros.subtasks.edges import edge_pairs, edge_places
+from noninteract_ros.subtasks.kinds.edges import edge_pairs, edge_places
 from noninteract_ros.team.team import Team
 
 

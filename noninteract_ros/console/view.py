@@ -12,7 +12,7 @@ DAMPING = 1e-3  # relative to the largest singular value: ghosts stay calm near 
 LARGEST_STEP = 0.5  # [m or rad] of a ghost from picture to picture
 
 
-class TeamView:
+class SceneState:
     """Poses of the team's joints, as it is and as its references ask for.
 
     Args:

@@ -4,11 +4,11 @@
 from dataclasses import dataclass
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.decoupling import TaskDynamics, TaskError
-from noninteract_ros.control.energy_account import Account
-from noninteract_ros.control.impedance import Impedance
-from noninteract_ros.control.joint_safety import SafetyReport
-from noninteract_ros.control.subtask_input import Led
+from noninteract_ros.control.energy.account import EnergyAccount
+from noninteract_ros.control.law.decoupling import TaskDynamics, TaskError
+from noninteract_ros.control.law.impedance import Impedance
+from noninteract_ros.control.references.subtask_input import SubtaskCommand
+from noninteract_ros.control.safety.joint_limits import SafetyReport
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import TeamState
 
@@ -59,7 +59,7 @@ class Tick:
     task: SubtaskState
     x_rate: Array
     error: TaskError
-    led: tuple[Led, ...]
+    led: tuple[SubtaskCommand, ...]
     dynamics: TaskDynamics
     task_acceleration: Array
     feedback: Array
@@ -68,7 +68,7 @@ class Tick:
     added_torque: Array
     safety: SafetyReport
     restarted: str
-    account: Account
+    account: EnergyAccount
     law: str
     in_transition: bool
 

@@ -12,3 +12,16 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 # transport whatever FASTDDS_BUILTIN_TRANSPORTS says; only a profile keeps data away from it.
 if "FASTDDS_DEFAULT_PROFILES_FILE" not in os.environ:
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(Path(__file__).parent / "udp.xml"))
+
+# Module of each program, below this package; setup.py names the same entry points.
+PROGRAMS = {
+    "robot_team": "team.robot_team",
+    "haptic_emulator": "sources.haptic_emulator",
+    "relative_planner": "sources.relative_planner",
+    "controller": "controller.controller",
+    "operator_console": "console.operator_console",
+    "joy_operator": "sources.joy_operator",
+    "pose_operator": "sources.pose_operator",
+    "keyboard_operator": "sources.keyboard_operator",
+    "recorder": "recording.recorder",
+}

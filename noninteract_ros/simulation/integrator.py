@@ -7,7 +7,7 @@ from typing import Protocol
 from noninteract_ros.arrays import Array
 
 
-class Space(Protocol):
+class ConfigurationSpace(Protocol):
     """Configurations that tangent vectors lead from one to the other."""
 
     def integrate(self, q: Array, step: Array) -> Array:
@@ -18,7 +18,7 @@ class Space(Protocol):
 
 
 def runge_kutta_step(
-    space: Space,
+    space: ConfigurationSpace,
     derivative: Callable[[Array, Array], tuple[Array, Array]],
     q: Array,
     v: Array,

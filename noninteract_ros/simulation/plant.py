@@ -10,14 +10,14 @@ import pinocchio as pin
 from noninteract_ros.arrays import Array
 from noninteract_ros.simulation.contact import Coupling, Effect, FrameMotion
 from noninteract_ros.simulation.push import Push
-from noninteract_ros.team.joining import append_model
+from noninteract_ros.team.joined_model import append_model
 from noninteract_ros.team.team import Team
 
 AXES = pin.LOCAL_WORLD_ALIGNED
 
 
 @dataclass(frozen=True, slots=True)
-class Outside:
+class ExternalLoads:
     """What acts on a plant besides controls, gravity and friction.
 
     Attributes:
@@ -97,11 +97,11 @@ class Plant:
             return v
         return pin.dDifference(self.model, q_0, q, pin.ARG1) @ v
 
-    def outside(self, q: Array, v: Array, pushes: Sequence[Push] = ()) -> Outside:
+    def outside(self, q: Array, v: Array, pushes: Sequence[Push] = ()) -> ExternalLoads:
         """What couplings and pushes do at a state of the plant."""
         none = np.zeros(self.model.nv)
         if not self.couplings and not pushes:
-            return Outside(none, none, ())
+            return ExternalLoads(none, none, ())
         pin.computeJointJacobians(self.model, self._data, q)
         coupling_torque, effects = none.copy(), []
         for coupling, frames in zip(self.couplings, self._frames, strict=True):
@@ -115,7 +115,7 @@ class Plant:
         for push in pushes:
             J = self._jacobian(self._frame(push.frame))
             push_torque += J.T @ self._in_world_axes(push)
-        return Outside(coupling_torque, push_torque, tuple(effects))
+        return ExternalLoads(coupling_torque, push_torque, tuple(effects))
 
     def _jacobian(self, frame: int) -> Array:
         return pin.getFrameJacobian(self.model, self._data, frame, AXES).reshape(6, -1)

@@ -8,7 +8,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError, one_of
-from noninteract_ros.last_call import LastCall
+from noninteract_ros.memo import Memo
 from noninteract_ros.schema import key
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import TeamState
@@ -52,7 +52,7 @@ class SubtaskObject:
                 allowed = "a subtask without rotations: the object is one of positions"
                 raise ScenarioError(f"object.{name}", repr(found), allowed)
         self._stack = stack
-        self._terms = LastCall(self._compute_terms)
+        self._terms = Memo(self._compute_terms)
         self._carrying = stack.slices[stack.names.index(settings.carried_by)]
         self._grasping = stack.slices[stack.names.index(settings.grasped_by)]
         self._grasped = stack.value_slices[stack.names.index(settings.grasped_by)]

@@ -24,7 +24,7 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
 from noninteract_ros.subtasks import so3
 
-Motion = tuple[Array, Array, Array]
+ValueMotion = tuple[Array, Array, Array]
 """Value (size,) or gap (dim,), with its velocity (dim,) and acceleration (dim,)."""
 
 UNIT_TOLERANCE = 1e-3
@@ -146,7 +146,7 @@ class Layout:
         result[..., self.quaternions] = so3.normalized(turned)
         return result
 
-    def gap(self, motion: Motion, base: Motion) -> Motion:
+    def gap(self, motion: ValueMotion, base: ValueMotion) -> ValueMotion:
         """How a motion differs from another: the difference and its two exact derivatives."""
         linear = tuple(a - b for a, b in zip(motion[1:], base[1:], strict=True))
         rate, rate_rate = linear
@@ -163,7 +163,7 @@ class Layout:
             rate[part], rate_rate[part] = phi_rate, _times(A_inverse, growth - bend)
         return e, rate, rate_rate
 
-    def moved(self, base: Motion, gap: Motion) -> Motion:
+    def moved(self, base: ValueMotion, gap: ValueMotion) -> ValueMotion:
         """The motion that a gap leads away from another: undoes `gap`."""
         linear = tuple(a + b for a, b in zip(base[1:], gap[1:], strict=True))
         velocity, acceleration = linear
@@ -178,7 +178,7 @@ class Layout:
             acceleration[part] = growth + _times(so3.hat(turn), omega) + alpha
         return self.sum(base[0], gap[0]), velocity, acceleration
 
-    def ahead(self, motion: Motion, dt: float) -> Motion:
+    def ahead(self, motion: ValueMotion, dt: float) -> ValueMotion:
         """A motion `dt` seconds later, its acceleration held.
 
         Rotations turn on by exp(omega dt + alpha dt^2 / 2), with the exact derivatives of that.
@@ -196,7 +196,9 @@ class Layout:
         still = np.zeros_like(velocity)
         return self.moved((x, still, still), (way, velocity + dt * acceleration, acceleration))
 
-    def departure(self, motion: Motion, before: Motion, dt: float) -> tuple[Array, Array]:
+    def departure(
+        self, motion: ValueMotion, before: ValueMotion, dt: float
+    ) -> tuple[Array, Array]:
         """Difference and its rate between a motion and where another one led `dt` s later.
 
         They are the first two of `gap` from `ahead`, without the work for the third.
@@ -226,7 +228,7 @@ class Layout:
         result[self._wound] = x[self._wound]
         return result
 
-    def _carried(self, phi: Array, base: Motion) -> tuple[Array, Array]:
+    def _carried(self, phi: Array, base: ValueMotion) -> tuple[Array, Array]:
         """Angular velocity and acceleration of the base, turned by exp(phi)."""
         E = so3.matrix(so3.exp(phi))
         return _times(E, base[1][self.angular]), _times(E, base[2][self.angular])

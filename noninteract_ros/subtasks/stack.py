@@ -7,7 +7,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import SubtaskError
-from noninteract_ros.last_call import LastCall
+from noninteract_ros.memo import Memo
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.team import Team, TeamState
@@ -41,7 +41,7 @@ class SubtaskStack:
         self.layout = Layout.joined([subtask.layout for subtask in subtasks])
         self.slices = _slices([subtask.dim for subtask in subtasks])
         self.value_slices = _slices([subtask.size for subtask in subtasks])
-        self._stacked, self._stacked_rate = LastCall(_stack), LastCall(_stack)
+        self._stacked, self._stacked_rate = Memo(_stack), Memo(_stack)
         self._bounded = [
             task for task in self.subtasks if type(task).soundness is not Subtask.soundness
         ]

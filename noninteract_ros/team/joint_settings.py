@@ -11,13 +11,13 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import join, key
 from noninteract_ros.team.joint_coordinates import JointCoordinates
-from noninteract_ros.team.wiring import Wiring
+from noninteract_ros.team.robot_topics import RobotTopics
 
 ROUNDING = 1e-9  # [m or rad] by which a position may pass a limit.
 
 
 @dataclass(frozen=True, kw_only=True)
-class JointSettings(Wiring):
+class JointSettings(RobotTopics):
     """Keys that every robot has for its joints: one number for all, or one per joint.
 
     Friction acts in the simulation alone. The controller does not know it, as it does not know

@@ -9,8 +9,8 @@ import pinocchio as pin
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import TeamError
-from noninteract_ros.last_call import LastCall
-from noninteract_ros.team.joining import append_model
+from noninteract_ros.memo import Memo
+from noninteract_ros.team.joined_model import append_model
 from noninteract_ros.team.joint_coordinates import JointCoordinates
 from noninteract_ros.team.robot import Robot
 
@@ -102,7 +102,7 @@ class Team:
             for _ in range(joint.nv)
         )
         self._constant: TeamState | None = None
-        self._tool_inverses = LastCall(self._compute_tool_inverses)
+        self._tool_inverses = Memo(self._compute_tool_inverses)
 
     @staticmethod
     def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:

@@ -17,7 +17,7 @@ from waiting import DEADLINE, until
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
 from noninteract_ros.subtasks import so3
 
 if TYPE_CHECKING:

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.console.drive import NO_TURN, Drivable, Drive, Scene
-from noninteract_ros.console.held import Drag, Held, Push
-from noninteract_ros.control.reference import Reference
+from noninteract_ros.console.drive import NO_TURN, Drivable, Drive, DriveState
+from noninteract_ros.console.page_input import Held, PageDrag, PagePush
 from noninteract_ros.subtasks import so3
+from noninteract_ros.subtasks.reference import Reference
 
 NAME = "cooperative"
 STEP = 1.0 / 120.0
@@ -22,24 +22,24 @@ QUARTER = so3.exp(np.array([0.0, 0.0, 0.5 * np.pi]))
 START = {"planar": np.array([1.0, 2.0]), "pose": np.array([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0])}
 
 
-def scene(desired: Array, frame: Array = NO_TURN, led: bool = True) -> Scene:
-    return Scene({NAME: desired}, {NAME: frame}, frozenset([NAME] if led else []))
+def scene(desired: Array, frame: Array = NO_TURN, led: bool = True) -> DriveState:
+    return DriveState({NAME: desired}, {NAME: frame}, frozenset([NAME] if led else []))
 
 
 def lead(
-    drive: Drive, held: Callable[[int], Held | None], seen: Scene, ticks: int
+    drive: Drive, held: Callable[[int], Held | None], seen: DriveState, ticks: int
 ) -> list[Reference]:
     """What is said in so many ticks, while something is held at each."""
     said = [drive.step(held(tick), seen, STEP) for tick in range(ticks)]
     return [references[NAME] for references in said if references]
 
 
-def drag(by: list[float], turn: Array = NO_TURN, grab: int = 1, element: int = 0) -> Drag:
-    return Drag(NAME, element, grab, np.array(by), turn)
+def drag(by: list[float], turn: Array = NO_TURN, grab: int = 1, element: int = 0) -> PageDrag:
+    return PageDrag(NAME, element, grab, np.array(by), turn)
 
 
-def push(linear: list[float]) -> Push:
-    return Push(NAME, 0, 1, np.array(linear), np.zeros(3))
+def push(linear: list[float]) -> PagePush:
+    return PagePush(NAME, 0, 1, np.array(linear), np.zeros(3))
 
 
 def check_bounds(said: list[Reference], subtask: Drivable) -> None:
@@ -152,5 +152,5 @@ def test_what_somebody_else_leads_is_left_alone() -> None:
 def test_nothing_is_said_before_the_team_is_known() -> None:
     """Without a desired value to start from there is no reference."""
     drive = Drive({NAME: PLANAR})
-    unknown = Scene({}, {}, frozenset([NAME]))
+    unknown = DriveState({}, {}, frozenset([NAME]))
     assert lead(drive, lambda _: push([1, 0, 0]), unknown, 10) == []

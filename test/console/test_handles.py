@@ -12,7 +12,7 @@ from noninteract_ros.console.drive import NO_TURN
 from noninteract_ros.console.handles import Handles, drivables
 from noninteract_ros.console.stage import Stage
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
 from noninteract_ros.subtasks import so3
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from noninteract_ros.console.held import Drag, Push
+from noninteract_ros.console.page_input import PageDrag, PagePush
 from noninteract_ros.console.protocol import KINDS, held, parse
 from noninteract_ros.errors import InputError
 
@@ -109,8 +109,8 @@ def test_what_is_no_message_is_refused(data: str | bytes) -> None:
 def test_what_is_held_comes_out_as_arrays() -> None:
     """Drags and pushes are things to hold; other messages are not."""
     drag, push = held(parse(text("drag"))), held(parse(text("push")))
-    assert isinstance(drag, Drag)
-    assert isinstance(push, Push)
+    assert isinstance(drag, PageDrag)
+    assert isinstance(push, PagePush)
     np.testing.assert_array_equal(drag.by, [0.1, 0.0, -2.0])
     np.testing.assert_array_equal(push.linear, [1.0, -1.0, 0.5])
     assert held(parse(text("release"))) is None

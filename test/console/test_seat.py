@@ -5,16 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from noninteract_ros.console.held import DeadMan, Push
-from noninteract_ros.console.limits import Allowance
-from noninteract_ros.console.seat import Seat
+from noninteract_ros.console.driver_lock import DriverLock
+from noninteract_ros.console.limits import RateLimit
+from noninteract_ros.console.page_input import PageDeadMan, PagePush
 
-HELD = Push("cooperative", 0, 7, np.ones(3), np.zeros(3))
+HELD = PagePush("cooperative", 0, 7, np.ones(3), np.zeros(3))
 
 
 def test_silence_lets_go() -> None:
     """What is not said again within the timeout is let go; a page that stutters goes on."""
-    switch = DeadMan(0.2)
+    switch = PageDeadMan(0.2)
     switch.hold(HELD, 1.0)
     assert switch.held(1.2) is not None
     assert switch.held(1.201) is None
@@ -24,7 +24,7 @@ def test_silence_lets_go() -> None:
 
 def test_after_a_long_silence_it_has_to_be_held_anew() -> None:
     """The same grab counts no more, however often it is said; another one does."""
-    switch = DeadMan(0.2)
+    switch = PageDeadMan(0.2)
     switch.hold(HELD, 1.0)
     for now in (2.1, 2.2, 2.3):
         switch.hold(HELD, now)
@@ -35,7 +35,7 @@ def test_after_a_long_silence_it_has_to_be_held_anew() -> None:
 
 def test_a_grab_has_a_number_of_its_own() -> None:
     """After a release the same page number is another grab, be it another page's."""
-    switch = DeadMan(0.2)
+    switch = PageDeadMan(0.2)
     grabs = []
     for now in (1.0, 1.1, 1.2):
         switch.hold(HELD, now)
@@ -49,8 +49,8 @@ def test_a_grab_has_a_number_of_its_own() -> None:
 
 def test_only_the_driver_holds() -> None:
     """What other pages hold has no effect, and neither has their letting go."""
-    switch = DeadMan(0.2)
-    seat = Seat(switch)
+    switch = PageDeadMan(0.2)
+    seat = DriverLock(switch)
     assert not seat.hold(1, HELD, 0.0)
     assert switch.held(0.0) is None
     seat.take(1, 0.0)
@@ -63,8 +63,8 @@ def test_only_the_driver_holds() -> None:
 
 def test_whoever_loses_the_seat_lets_go() -> None:
     """Taking over, leaving and being closed all release what was held."""
-    switch = DeadMan(0.2)
-    seat = Seat(switch)
+    switch = PageDeadMan(0.2)
+    seat = DriverLock(switch)
     seat.take(1, 0.0)
     seat.hold(1, HELD, 0.0)
     assert seat.take(2, 0.0) == 1
@@ -80,7 +80,7 @@ def test_whoever_loses_the_seat_lets_go() -> None:
 
 def test_a_silent_driver_is_noticed() -> None:
     """Silence counts from the driver's last word; others' words do not count."""
-    seat = Seat(DeadMan(0.2))
+    seat = DriverLock(PageDeadMan(0.2))
     assert seat.silence(100.0) == 0.0
     seat.take(1, 0.0)
     seat.heard(1, 3.0)
@@ -90,7 +90,7 @@ def test_a_silent_driver_is_noticed() -> None:
 
 def test_an_allowance_bounds_rate_and_burst() -> None:
     """In the long run so many a second, at once no more than that."""
-    allowance = Allowance(50.0)
+    allowance = RateLimit(50.0)
     assert sum(allowance.take(0.0) for _ in range(200)) == 50
     granted = sum(allowance.take(0.01 * k) for k in range(1, 1001))
     assert granted in (499, 500)

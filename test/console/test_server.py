@@ -10,12 +10,12 @@ import pytest
 from pages import RawPage
 from websockets.exceptions import InvalidStatus
 
-from noninteract_ros.console.held import DeadMan, Held
-from noninteract_ros.console.protocol import Said
-from noninteract_ros.console.seat import Seat
+from noninteract_ros.console.driver_lock import DriverLock
+from noninteract_ros.console.page_input import Held, PageDeadMan
+from noninteract_ros.console.protocol import PageCommand
 from noninteract_ros.console.server import ConsoleServer
-from noninteract_ros.console.settings import ConsoleSettings
 from noninteract_ros.errors import ScenarioError
+from noninteract_ros.scenario.console_settings import ConsoleSettings
 
 PUSH = {"subtask": "a", "element": 0, "grab": 1, "linear": [1, 0, 0], "angular": [0, 0, 0]}
 TOKEN = "a token that is known"
@@ -34,7 +34,7 @@ class Host:
     def knows(self, item: Held) -> bool:
         return item.subtask == "a" and item.element == 0
 
-    def command(self, page: int, said: Said) -> None:
+    def command(self, page: int, said: PageCommand) -> None:
         self.asked.append((page, said.kind))
 
 
@@ -42,8 +42,8 @@ class Console:
     """A server with what it serves."""
 
     def __init__(self, token: str = "", **settings: Any) -> None:
-        self.host, self.switch = Host(), DeadMan(0.2)
-        self.seat = Seat(self.switch)
+        self.host, self.switch = Host(), PageDeadMan(0.2)
+        self.seat = DriverLock(self.switch)
         chosen = ConsoleSettings(port=0, **settings)
         self.server = ConsoleServer(chosen, token, self.seat, self.host)
         self.server.start()
@@ -152,7 +152,7 @@ def test_only_this_machine_is_listened_to_by_default() -> None:
 
 def test_an_address_in_use_is_said(console: Console) -> None:
     """A port that is taken is named, with its key."""
-    seat = Seat(DeadMan(0.2))
+    seat = DriverLock(PageDeadMan(0.2))
     second = ConsoleServer(ConsoleSettings(port=console.server.port), "", seat, Host())
     with pytest.raises(ScenarioError, match=r"console\.port"):
         second.start()

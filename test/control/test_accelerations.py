@@ -6,11 +6,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from noninteract_ros.control.desired import DesiredMotion
-from noninteract_ros.control.inputs import Motion, Rate, Target
-from noninteract_ros.control.reference import Reference
+from noninteract_ros.control.references.desired_motion import DesiredMotion
+from noninteract_ros.control.references.inputs import MotionInput, Rate, Target
 from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.reference import Reference
 
 STEP = 2e-3
 POSE = Layout((3,), (True,))
@@ -65,7 +65,7 @@ def left(velocity: np.ndarray, acceleration: np.ndarray) -> DesiredMotion:
 
 
 def hand_over(
-    desired: DesiredMotion, taker: Callable[[float], Motion | None], seconds: float
+    desired: DesiredMotion, taker: Callable[[float], MotionInput | None], seconds: float
 ) -> list[Reference]:
     """The motion from the last one of the former source on."""
     count = round(seconds / STEP)

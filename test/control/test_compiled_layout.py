@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from noninteract_ros.control.compiled_layout import CompiledLayout
+from noninteract_ros.control.fast.compiled_layout import CompiledLayout
 from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.layout import Layout
 

@@ -6,7 +6,7 @@ import pytest
 from planar_arms import UNLIKE, PlanarArms, mixed_subtasks, slices_of, stack_of
 from scipy.integrate import solve_ivp
 
-from noninteract_ros.control.decoupling import (
+from noninteract_ros.control.law.decoupling import (
     LAWS,
     TaskDynamics,
     TaskError,
@@ -14,8 +14,10 @@ from noninteract_ros.control.decoupling import (
     paper_coriolis_force,
     task_dynamics,
 )
-from noninteract_ros.control.impedance import Impedance
-from noninteract_ros.control.plain_form import (
+from noninteract_ros.control.law.impedance import Impedance
+from noninteract_ros.subtasks.subtask import SubtaskState
+from noninteract_ros.team.team import TeamState
+from noninteract_ros.validation.identities.plain_form import (
     block_diagonal,
     corollary_decoupling_matrix,
     decoupling_matrix,
@@ -25,8 +27,6 @@ from noninteract_ros.control.plain_form import (
     subtask_coriolis,
     task_coriolis,
 )
-from noninteract_ros.subtasks.subtask import SubtaskState
-from noninteract_ros.team.team import TeamState
 
 STEP = 1e-6
 STATES = range(40)

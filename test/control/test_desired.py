@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from noninteract_ros.control.desired import DesiredMotion, Shaper
-from noninteract_ros.control.inputs import Rate, Target
-from noninteract_ros.control.reference import Reference
+from noninteract_ros.control.references.desired_motion import DesiredMotion, MotionShaper
+from noninteract_ros.control.references.inputs import Rate, Target
+from noninteract_ros.subtasks.reference import Reference
 
 STEP = 1e-3
 LIMITS = np.array([[1.0, 0.5], [5.0, 3.0], [50.0, 40.0]])  # velocity, acceleration, jerk
@@ -205,7 +205,7 @@ def test_a_set_point_out_of_this_world_is_approached_at_the_limit(distance):
 def test_any_start_has_a_next_step():
     """From starts far beyond the limits the next state is finite, and where they lead to."""
     rng = np.random.default_rng(0)
-    shaper = Shaper(LIMITS)
+    shaper = MotionShaper(LIMITS)
     for k in range(3000):
         scale = np.exp(rng.uniform(-20.0, 6.0, (3, 1)))
         start = Reference(*(rng.normal(size=(3, 2)) * scale))

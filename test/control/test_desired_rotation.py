@@ -6,11 +6,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from noninteract_ros.control.desired import DesiredMotion
-from noninteract_ros.control.inputs import Rate, Target
-from noninteract_ros.control.reference import Reference
+from noninteract_ros.control.references.desired_motion import DesiredMotion
+from noninteract_ros.control.references.inputs import Rate, Target
 from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.reference import Reference
 
 POSE = Layout((2,), (True,))
 STEP = 2e-3

@@ -6,14 +6,14 @@ import pytest
 from planar_arms import PlanarArms, mixed_subtasks, slices_of, stack_of
 from scipy.integrate import solve_ivp
 
-from noninteract_ros.control.decoupling import (
+from noninteract_ros.control.energy.storage import Energy, energy
+from noninteract_ros.control.law.decoupling import (
     LAWS,
     TaskError,
     commanded_acceleration,
     task_dynamics,
 )
-from noninteract_ros.control.energy import Energy, energy
-from noninteract_ros.control.impedance import Impedance
+from noninteract_ros.control.law.impedance import Impedance
 
 ARMS = PlanarArms()
 SUBTASKS = mixed_subtasks(2)

@@ -10,16 +10,16 @@ import pytest
 from planar_arms import UNLIKE, PlanarArms
 from test_structured import Pair, assert_close
 
-from noninteract_ros.control.decoupling import commanded_acceleration
-from noninteract_ros.control.gated_law import decoupling, gated_acceleration
-from noninteract_ros.control.impedance import ImpedanceSettings
-from noninteract_ros.control.reference import Reference
-from noninteract_ros.control.subtask_input import InputSettings
-from noninteract_ros.control.team_controller import TeamController
+from noninteract_ros.control.controller import TeamController
+from noninteract_ros.control.law.decoupling import commanded_acceleration
+from noninteract_ros.control.law.gated_law import decoupling, gated_acceleration
+from noninteract_ros.control.law.impedance import ImpedanceSettings
+from noninteract_ros.control.references.subtask_input import InputSettings
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.team_simulation import TeamSimulation
-from noninteract_ros.subtasks.cooperative_position import CooperativePosition
-from noninteract_ros.subtasks.relative_position import RelativePosition
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
+from noninteract_ros.subtasks.reference import Reference
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
@@ -152,7 +152,9 @@ def test_half_open_gates_are_the_same_robot_by_robot(name):
         added = decoupling(*arguments)
         assert added.power == pytest.approx(float(pair.error.e_rate @ added.force))
         found.append(
-            np.concatenate([gated_acceleration(*arguments[:2], added, tank), added.force])
+            np.concatenate(
+                [gated_acceleration(*arguments[:2], added, tank.sigma, tank.grip), added.force]
+            )
         )
     assert_close(*found)
 
@@ -164,7 +166,8 @@ def test_gates_mix_both_laws_with_the_springs_and_dampers_in_force(sigma, grip):
     pair = Pair("star of 8", 0)
     dynamics, error, impedance = pair.dense.dynamics, pair.error, pair.impedance
     tank = replace(Loop().core.gate.tank, sigma=sigma, grip=grip)
-    found = gated_acceleration(dynamics, error, decoupling(dynamics, error, impedance), tank)
+    added = decoupling(dynamics, error, impedance)
+    found = gated_acceleration(dynamics, error, added, tank.sigma, tank.grip)
     assert np.isinf(impedance.max_force).all()  # So that a share of the stiffness is one of h.
     weaker = replace(
         impedance, stiffness=grip * impedance.stiffness, damping=grip * impedance.damping

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from noninteract_ros.control.energy_tank import (
+from noninteract_ros.control.energy.tank import (
     Interval,
     TankSettings,
     affordable,
@@ -16,7 +16,7 @@ from noninteract_ros.control.energy_tank import (
     refill,
     revalue,
 )
-from noninteract_ros.control.energy_tank import step as advance
+from noninteract_ros.control.energy.tank import step as advance
 from noninteract_ros.errors import ScenarioError
 
 SETTINGS = TankSettings()

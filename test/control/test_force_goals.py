@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from noninteract_ros.control.force_goal import ForceGoals
-from noninteract_ros.control.impedance import ImpedanceSettings
-from noninteract_ros.rehearsal import Rehearsal
+from noninteract_ros.control.law.force_goal import ForceGoals
+from noninteract_ros.control.law.impedance import ImpedanceSettings
 from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario.rehearsal import Rehearsal
 
 ROBOTS: dict[str, Any] = {
     "robots": ["light", "heavy"],

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from repository import ROOT
 
-from noninteract_ros.control.hand_over import HandOvers
+from noninteract_ros.control.references.hand_over import HandOvers
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
+from noninteract_ros.scenario.rehearsal import Rehearsal
 
 RELATIVE = slice(2, 4)
 

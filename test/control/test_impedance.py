@@ -4,14 +4,14 @@
 import numpy as np
 import pytest
 
-from noninteract_ros.control.impedance import (
+from noninteract_ros.control.law.impedance import (
     Impedance,
     ImpedanceSettings,
     spread,
     stack_impedance,
 )
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.subtasks.mixed_position import MixedPosition
+from noninteract_ros.subtasks.kinds.mixed_position import MixedPosition
 
 STIFFNESS = np.array([0.0, 30.0, 400.0, 30.0, 400.0])
 BOUND = np.array([3.0, np.inf, np.inf, 2.0, 5.0])

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from noninteract_ros.control.inputs import HORIZON, Force, Rate, Source
+from noninteract_ros.control.references.inputs import HORIZON, Force, Rate, Source
 from noninteract_ros.errors import InputError
 
 

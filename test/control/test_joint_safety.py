@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from noninteract_ros.control.joint_safety import JointSafety, SafetyReport
-from noninteract_ros.control.safety_settings import SafetySettings
-from noninteract_ros.team.planar_arm import PlanarArm
+from noninteract_ros.control.safety.joint_limits import JointSafety, SafetyReport
+from noninteract_ros.control.safety.settings import SafetySettings
+from noninteract_ros.team.models.planar_arm import PlanarArm
 from noninteract_ros.team.team import Team
 
 STEP = 1e-3

@@ -3,8 +3,8 @@
 
 from pathlib import Path
 
-from noninteract_ros.rehearsal import Rehearsal
-from noninteract_ros.scenario_file import find_scenario, load_scenario
+from noninteract_ros.scenario.files import find_scenario, load_scenario
+from noninteract_ros.scenario.rehearsal import Rehearsal
 
 
 def test_two_pandas_go_through_the_natural_law_and_back_without_a_debt() -> None:

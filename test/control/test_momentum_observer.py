@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from planar_arms import UNLIKE, PlanarArms
 
-from noninteract_ros.control.momentum_observer import MomentumObserver
+from noninteract_ros.control.energy.momentum_observer import MomentumObserver
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.team_simulation import TeamSimulation
 from noninteract_ros.team.team import Team

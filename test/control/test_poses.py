@@ -6,19 +6,24 @@ import pytest
 from scipy.spatial.transform import Rotation
 from spatial_arms import random_state, spatial_team
 
-from noninteract_ros.control.decoupling import (
-    TaskError,
-    commanded_acceleration,
-    task_dynamics,
-)
-from noninteract_ros.control.energy import Energy, energy
-from noninteract_ros.control.impedance import (
+from noninteract_ros.control.energy.storage import Energy, energy
+from noninteract_ros.control.law.decoupling import TaskError, commanded_acceleration, task_dynamics
+from noninteract_ros.control.law.impedance import (
     Impedance,
     ImpedanceSettings,
     spread,
     stack_impedance,
 )
-from noninteract_ros.control.plain_form import (
+from noninteract_ros.errors import ScenarioError
+from noninteract_ros.subtasks import so3
+from noninteract_ros.subtasks.kinds.cooperative_pose import CooperativePose
+from noninteract_ros.subtasks.kinds.posture import Posture
+from noninteract_ros.subtasks.kinds.relative_pose import RelativePose
+from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.reference import Reference
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.team.team import Team, TeamState
+from noninteract_ros.validation.identities.plain_form import (
     block_diagonal,
     decoupling_matrix,
     natural_torque,
@@ -26,15 +31,6 @@ from noninteract_ros.control.plain_form import (
     plain_torque,
     subtask_coriolis,
 )
-from noninteract_ros.control.reference import Reference
-from noninteract_ros.errors import ScenarioError
-from noninteract_ros.subtasks import so3
-from noninteract_ros.subtasks.cooperative_pose import CooperativePose
-from noninteract_ros.subtasks.layout import Layout
-from noninteract_ros.subtasks.posture import Posture
-from noninteract_ros.subtasks.relative_pose import RelativePose
-from noninteract_ros.subtasks.stack import SubtaskStack
-from noninteract_ros.team.team import Team, TeamState
 
 STATES = range(30)
 SETTINGS = ImpedanceSettings((90.0, 60.0, 30.0, 20.0), (9.0, 8.0, 7.0, 2.0))

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from noninteract_ros.control.reference import Reference
+from noninteract_ros.subtasks.reference import Reference
 
 
 def test_extrapolation_follows_constant_acceleration():

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from noninteract_ros.control.joint_safety import SafetyReport
-from noninteract_ros.control.safety_watch import LINGER, SafetyWatch
+from noninteract_ros.control.safety.joint_limits import SafetyReport
+from noninteract_ros.control.telemetry.limit_activity import LINGER, LimitActivity
 
 JOINTS = ("left/joint_1", "left/joint_2")
 
@@ -51,7 +51,7 @@ def tick(
 )
 def test_each_condition_has_words(what, texts):
     """Joints are called by name, and a team inside its limits is no news."""
-    watch = SafetyWatch(JOINTS)
+    watch = LimitActivity(JOINTS)
     watch.note(1.0, tick(**what))
     assert watch.conditions(1.0) == texts
     assert watch.interventions == bool(texts)
@@ -59,7 +59,7 @@ def test_each_condition_has_words(what, texts):
 
 def test_a_condition_that_comes_and_goes_is_told_without_flicker():
     """Every third tick at the effort limit is one condition, until it has been over for 1 s."""
-    watch = SafetyWatch(JOINTS)
+    watch = LimitActivity(JOINTS)
     for k in range(3000):
         now = k / 1000.0
         watch.note(now, tick(effort_share=0.5 if k % 3 == 0 and k < 1500 else 1.0))
@@ -70,7 +70,7 @@ def test_a_condition_that_comes_and_goes_is_told_without_flicker():
 
 def test_values_are_the_lowest_since_they_were_asked_for():
     """A single tick between two reports is seen; then it starts anew."""
-    watch = SafetyWatch(JOINTS)
+    watch = LimitActivity(JOINTS)
     for share in (1.0, 0.3, 1.0):
         watch.note(0.0, tick(law_share=share, regularity=0.2 + share, effort_share=0.1 + share))
     values = watch.values()
@@ -86,7 +86,7 @@ def test_values_are_the_lowest_since_they_were_asked_for():
 
 def test_a_reset_forgets_conditions_of_another_time():
     """When the team's clock starts anew, nothing is told of what its former time had."""
-    watch = SafetyWatch(JOINTS)
+    watch = LimitActivity(JOINTS)
     watch.note(50.0, tick(law_share=0.0))
     watch.reset()
     assert watch.conditions(0.0) == []

@@ -4,20 +4,24 @@
 import numpy as np
 import pytest
 
-from noninteract_ros.control.decoupling import LAWS
-from noninteract_ros.control.impedance import ImpedanceSettings
-from noninteract_ros.control.inputs import Rate
-from noninteract_ros.control.reference import Reference
-from noninteract_ros.control.safety_settings import SafetySettings
-from noninteract_ros.control.singularity import SingularityGuard, best_regularity, regularity
-from noninteract_ros.control.subtask_input import InputSettings
-from noninteract_ros.control.team_controller import TeamController
+from noninteract_ros.control.controller import TeamController
+from noninteract_ros.control.law.decoupling import LAWS
+from noninteract_ros.control.law.impedance import ImpedanceSettings
+from noninteract_ros.control.references.inputs import Rate
+from noninteract_ros.control.references.subtask_input import InputSettings
+from noninteract_ros.control.safety.settings import SafetySettings
+from noninteract_ros.control.safety.singularity import (
+    SingularityGuard,
+    best_regularity,
+    regularity,
+)
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.team_simulation import TeamSimulation
-from noninteract_ros.subtasks.cooperative_position import CooperativePosition
-from noninteract_ros.subtasks.relative_position import RelativePosition
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
+from noninteract_ros.subtasks.reference import Reference
 from noninteract_ros.subtasks.stack import SubtaskStack
-from noninteract_ros.team.planar_arm import PlanarArm
+from noninteract_ros.team.models.planar_arm import PlanarArm
 from noninteract_ros.team.team import Team
 
 STEP = 1e-3

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from repository import ROOT
 
-from noninteract_ros.control.inputs import Rate
-from noninteract_ros.control.stop import RAMP, Stop
+from noninteract_ros.control.references.inputs import Rate
+from noninteract_ros.control.safety.stop import RAMP, Stop
 from noninteract_ros.control.tick import Tick
-from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
+from noninteract_ros.scenario.rehearsal import Rehearsal
 
 ARMS = read_parameters(ROOT / "config" / "planar_arms.yaml")
 SLOWEST = 30.0  # [1/s] rate of the fastest motions, the default of `stop_rate`
@@ -21,7 +21,7 @@ FAST, STARTING = ((0.2, -0.4), 0.6), ((0.2, -0.4), 0.1)  # A velocity, and how l
 TAME, COOPERATIVE, APART = ((0.1, -0.17), 0.6), slice(0, 2), slice(2, 4)
 
 
-class Led:
+class SubtaskCommand:
     """Two unlike arms that hold an object, led at a velocity by a human's rates.
 
     Args:
@@ -80,7 +80,7 @@ def torque_rates(before: Tick, ticks: list[Tick]) -> np.ndarray:
 @pytest.mark.parametrize("led", [TAME, FAST, STARTING])
 def test_a_stop_is_soon_and_no_longer_than_a_release(led: Any) -> None:
     """Sooner at rest, and on a shorter way, than where one lets go; within 0.2 s."""
-    released, stopped = Led(*led), Led(*led)
+    released, stopped = SubtaskCommand(*led), SubtaskCommand(*led)
     let_go, stop = released.released(), stopped.stopped()
     assert joint_speeds(stop)[0] > 0.2
     assert rest_time(stop) < min(0.2, rest_time(let_go))
@@ -90,7 +90,7 @@ def test_a_stop_is_soon_and_no_longer_than_a_release(led: Any) -> None:
 @pytest.mark.parametrize("led", [TAME, FAST, STARTING])
 def test_a_stop_keeps_the_other_subtask_where_it_is(led: Any) -> None:
     """All joints come to rest alike: what is held apart stays so but for the way's curvature."""
-    arms = Led(*led)
+    arms = SubtaskCommand(*led)
     ticks = arms.stopped()
     moved = way(arms.before, ticks, COOPERATIVE)
     assert moved > 5e-3
@@ -101,7 +101,7 @@ def test_the_torque_of_a_stop_rises_without_a_step() -> None:
     """From what it was before, ever smaller steps at ever shorter ticks: none is in it."""
     largest = []
     for rate in (500.0, 1000.0, 2000.0):
-        arms = Led(*FAST, rate=rate)
+        arms = SubtaskCommand(*FAST, rate=rate)
         torques = [tick.torque for tick in (arms.before, *arms.stopped())]
         largest.append(np.abs(np.diff(torques, axis=0)).max())
     np.testing.assert_allclose(np.divide(largest[:-1], largest[1:]), 2.0, rtol=0.1)
@@ -110,7 +110,7 @@ def test_the_torque_of_a_stop_rises_without_a_step() -> None:
 def test_a_stop_keeps_the_limit_of_the_torque_rate_and_still_comes_to_rest() -> None:
     """Where the limit is lower than what the stop would ask for, it takes a little longer."""
     limit = 300.0
-    free, bounded = Led(*FAST), Led(*FAST, safety={"torque_rate": limit})
+    free, bounded = SubtaskCommand(*FAST), SubtaskCommand(*FAST, safety={"torque_rate": limit})
     assert torque_rates(free.before, free.stopped()).max() > 2.0 * limit
     ticks = bounded.stopped()
     assert any(tick.safety.rate_share < 1.0 for tick in ticks)
@@ -120,7 +120,7 @@ def test_a_stop_keeps_the_limit_of_the_torque_rate_and_still_comes_to_rest() -> 
 
 def test_a_stop_takes_energy_out_of_the_arms_and_puts_none_in() -> None:
     """From the first tick that has nothing left of before, their kinetic energy only falls."""
-    arms = Led(*STARTING)
+    arms = SubtaskCommand(*STARTING)
     ticks = arms.stopped()
     energies = [0.5 * tick.state.v @ tick.state.M @ tick.state.v for tick in ticks]
     ramp = round(1e3 * RAMP / SLOWEST)
@@ -131,7 +131,7 @@ def test_a_stop_takes_energy_out_of_the_arms_and_puts_none_in() -> None:
 
 def test_a_slow_loop_is_not_damped_more_than_it_can_hold() -> None:
     """A torque that is held for a tick takes at most a quarter of the velocity."""
-    arms = Led(*TAME, rate=100.0)
+    arms = SubtaskCommand(*TAME, rate=100.0)
     arms.controller.stop()
     speeds = joint_speeds([arms.tick() for _ in range(60)])
     fast = speeds[:-1] > 1e-9

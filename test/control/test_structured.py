@@ -11,22 +11,22 @@ import numpy as np
 import pytest
 from spatial_arms import spatial_arm
 
-from noninteract_ros.control.decoupling import LAWS, TaskError, commanded_acceleration
-from noninteract_ros.control.energy import energy
-from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
-from noninteract_ros.control.singularity import regularity
-from noninteract_ros.control.structure import Structure
-from noninteract_ros.control.subtask_input import InputSettings
-from noninteract_ros.control.team_controller import TeamController
-from noninteract_ros.control.team_view import DenseView
-from noninteract_ros.subtasks.cooperative_pose import CooperativeOrientation, CooperativePose
-from noninteract_ros.subtasks.cooperative_position import CooperativePosition
+from noninteract_ros.control.controller import TeamController
+from noninteract_ros.control.energy.storage import energy
+from noninteract_ros.control.fast.robotwise_evaluation import RobotwiseEvaluator
+from noninteract_ros.control.law.decoupling import LAWS, TaskError, commanded_acceleration
+from noninteract_ros.control.law.impedance import ImpedanceSettings, stack_impedance
+from noninteract_ros.control.law.team_dynamics import DenseEvaluator
+from noninteract_ros.control.references.subtask_input import InputSettings
+from noninteract_ros.control.safety.singularity import regularity
+from noninteract_ros.subtasks.kinds.cooperative_pose import CooperativeOrientation, CooperativePose
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.posture import Posture
+from noninteract_ros.subtasks.kinds.relative_pose import RelativeOrientation, RelativePose
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
 from noninteract_ros.subtasks.mixing import EdgeMixing
-from noninteract_ros.subtasks.posture import Posture
-from noninteract_ros.subtasks.relative_pose import RelativeOrientation, RelativePose
-from noninteract_ros.subtasks.relative_position import RelativePosition
 from noninteract_ros.subtasks.stack import SubtaskStack
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team
 
 SIZES = ("zyzyzyz", "zyzyzy", "zyzyzyzy")  # joints of the arms, in turn
@@ -105,8 +105,8 @@ class Pair:
         self.impedance = stack_impedance(self.stack.subtasks, settings)
         q = self.team.integrate(self.team.q0, rng.uniform(-0.3, 0.3, n))
         self.v, inertias = rng.normal(size=n), self.impedance.inertias
-        self.dense = DenseView(self.team, self.stack).evaluate(q, self.v, inertias)
-        structure = Structure.of(self.team, self.stack)
+        self.dense = DenseEvaluator(self.team, self.stack).evaluate(q, self.v, inertias)
+        structure = RobotwiseEvaluator.of(self.team, self.stack)
         assert structure is not None
         self.structured = structure.evaluate(q, self.v, inertias)
         self.error = TaskError(*rng.normal(size=(5, n)))
@@ -174,9 +174,9 @@ class TestBothForms:
 def test_other_subtasks_stay_dense():
     team = team_of(3)
     stack = stack_of(team)
-    assert isinstance(Structure.of(team, stack), Structure)
+    assert isinstance(RobotwiseEvaluator.of(team, stack), RobotwiseEvaluator)
     stack.subtasks[0].mixing = None
-    assert Structure.of(team, stack) is None
+    assert RobotwiseEvaluator.of(team, stack) is None
 
 
 @pytest.mark.parametrize("axes", [("x",), ("x", "z")])
@@ -187,7 +187,7 @@ def test_point_masses_have_it_too(axes):
     lead = CooperativePosition("cooperative_position", weights=(1.0, 2.0, 1.0)).build("lead", team)
     gap = RelativePosition("relative_position").build("gap", team)
     stack = SubtaskStack(team, [gap, lead])
-    structure, dense = Structure.of(team, stack), DenseView(team, stack)
+    structure, dense = RobotwiseEvaluator.of(team, stack), DenseEvaluator(team, stack)
     for seed in range(2):
         q, v, f = np.random.default_rng(seed).normal(size=(3, team.n))
         seen, wanted = (view.evaluate(q, v, (None, None)) for view in (structure, dense))
@@ -206,7 +206,7 @@ def test_edges_that_are_no_tree_have_no_structure(edges):
     for subtask in stack.subtasks:
         if isinstance(subtask.mixing, EdgeMixing):
             subtask.mixing = replace(subtask.mixing, pairs=tuple(places))
-    assert Structure.of(team, stack) is None
+    assert RobotwiseEvaluator.of(team, stack) is None
 
 
 def test_a_controller_of_ten_arms_uses_it_through_every_change():
@@ -215,8 +215,8 @@ def test_a_controller_of_ten_arms_uses_it_through_every_change():
     settings = [ImpedanceSettings((40.0,), (9.0,)) for _ in stack.subtasks]
     inputs = [InputSettings() for _ in stack.subtasks]
     core, dense = (TeamController(team, stack, LAWS[0], settings, inputs) for _ in range(2))
-    assert isinstance(core._view, Structure)
-    dense._view = DenseView(team, stack)
+    assert isinstance(core._view, RobotwiseEvaluator)
+    dense._view = DenseEvaluator(team, stack)
     rng = np.random.default_rng(0)
     q, v = team.q0, 0.1 * rng.normal(size=team.n)
     changes = [
@@ -243,7 +243,8 @@ WORK = """
 import sys, numpy as np, test_structured
 team = test_structured.team_of(int(sys.argv[1]), ("zyzyzyz",))
 stack = test_structured.stack_of(team)
-seen = test_structured.Structure.of(team, stack).evaluate(team.q0, np.ones(team.n), (None,) * 3)
+evaluator = test_structured.RobotwiseEvaluator.of(team, stack)
+seen = evaluator.evaluate(team.q0, np.ones(team.n), (None,) * 3)
 
 class Counted(np.ndarray):
     reads = 0

@@ -4,11 +4,11 @@
 import numpy as np
 import pytest
 
-from noninteract_ros.control.inputs import Force, Rate, Target
-from noninteract_ros.control.reference import Reference
-from noninteract_ros.control.subtask_input import InputSettings, SubtaskInput
+from noninteract_ros.control.references.inputs import Force, Rate, Target
+from noninteract_ros.control.references.subtask_input import InputSettings, SubtaskInput
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.subtasks.mixed_position import MixedPosition
+from noninteract_ros.subtasks.kinds.mixed_position import MixedPosition
+from noninteract_ros.subtasks.reference import Reference
 
 STEP = 1e-3
 TASK = MixedPosition("lead", ("lead",), ("x", "y"), np.full((1, 2), 0.5))

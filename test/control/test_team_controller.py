@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 from planar_arms import UNLIKE, PlanarArms
 
-from noninteract_ros.control.continuity import JUMP
-from noninteract_ros.control.decoupling import LAWS, commanded_acceleration
-from noninteract_ros.control.impedance import ImpedanceSettings, stack_impedance
-from noninteract_ros.control.inputs import Force, Rate, Target
-from noninteract_ros.control.reference import Reference
-from noninteract_ros.control.subtask_input import InputSettings
-from noninteract_ros.control.team_controller import TeamController
+from noninteract_ros.control.controller import TeamController
+from noninteract_ros.control.law.decoupling import LAWS, commanded_acceleration
+from noninteract_ros.control.law.impedance import ImpedanceSettings, stack_impedance
+from noninteract_ros.control.references.inputs import Force, Rate, Target
+from noninteract_ros.control.references.subtask_input import InputSettings
+from noninteract_ros.control.safety.continuity import JUMP
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.team_simulation import TeamSimulation
-from noninteract_ros.subtasks.cooperative_position import CooperativePosition
-from noninteract_ros.subtasks.relative_position import RelativePosition
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
+from noninteract_ros.subtasks.reference import Reference
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 

@@ -14,8 +14,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 from waiting import until
 
-from noninteract_ros.rehearsal import rehearse
 from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario.rehearsal import rehearse
 
 FAR = 10**6  # [s]
 JOINTS = ["robot_1/x", "robot_1/y", "robot_2/x", "robot_2/y"]

@@ -13,8 +13,8 @@ from harness import paper
 from repository import ROOT
 from waiting import DEADLINE, until
 
-from noninteract_ros.analysis.repair import repair
-from noninteract_ros.nodes.parameter_files import write
+from noninteract_ros.nodes.common.parameter_files import write
+from noninteract_ros.reporting.recording.repair import repair
 
 
 def programs_of(process: int) -> dict[str, int]:

@@ -6,9 +6,9 @@ from harness import Ros, merged
 from repository import ROOT
 from waiting import until
 
-from noninteract_ros.rehearsal import rehearse
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
+from noninteract_ros.scenario.rehearsal import rehearse
 
 TICKS = 30
 

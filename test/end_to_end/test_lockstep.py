@@ -7,9 +7,9 @@ from harness import Ros, go, paper
 from programs import Programs
 from waiting import until
 
-from noninteract_ros.nodes.cdr import JointStateCodec
-from noninteract_ros.rehearsal import rehearse
+from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario.rehearsal import rehearse
 
 NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
 TICKS = 1000

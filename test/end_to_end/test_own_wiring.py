@@ -12,9 +12,9 @@ from repository import ROOT
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from waiting import DEADLINE, until
 
-from noninteract_ros.rehearsal import rehearse
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
+from noninteract_ros.scenario.rehearsal import rehearse
 
 NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
 

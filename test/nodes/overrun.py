@@ -16,9 +16,9 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from noninteract_ros.nodes.feed import Feed
-from noninteract_ros.nodes.node import LOOP_QOS
-from noninteract_ros.nodes.program import run_program
+from noninteract_ros.nodes.common.node import LOOP_QOS
+from noninteract_ros.nodes.common.program import run_program
+from noninteract_ros.nodes.recording.feed import RawSubscription
 
 TOPIC = "/overrun"
 COUNT = 900
@@ -56,7 +56,7 @@ def read() -> None:
     """Reads until its publisher is gone."""
     rclpy.init()
     node = Node("reader")
-    feed = Feed(node, TOPIC, "std_msgs/msg/String")
+    feed = RawSubscription(node, TOPIC, "std_msgs/msg/String")
     heard = 0
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end and (not heard or node.count_publishers(TOPIC)):

@@ -8,7 +8,7 @@ from repository import ROOT
 from std_msgs.msg import String
 from waiting import until
 
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
 
 LIMIT = 400.0  # [N/s]; all is faster here than in the scenario
 

@@ -9,8 +9,13 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes import cdr
-from noninteract_ros.nodes.cdr import QUANTITIES, JointStateCodec, join_stamp, order_by_name
+from noninteract_ros.nodes.messages import cdr
+from noninteract_ros.nodes.messages.cdr import (
+    QUANTITIES,
+    JointStateCodec,
+    join_stamp,
+    order_by_name,
+)
 
 NAMES = ("robot_1/x", "robot_1/long_joint", "é/q")
 STAMP = 12_345_678_901

@@ -14,9 +14,9 @@ from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from waiting import until
 
-from noninteract_ros.nodes.cdr import JointStateCodec
-from noninteract_ros.rehearsal import rehearse
+from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.scenario import Scenario
+from noninteract_ros.scenario.rehearsal import rehearse
 
 JOINTS = ["robot_1/x", "robot_1/y", "robot_2/x", "robot_2/y"]
 # The human holds the team against its springs, so that every gain is felt.

@@ -14,9 +14,9 @@ from std_msgs.msg import String
 from waiting import DEADLINE, until
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.nodes.descriptions import LATCHED_QOS
+from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
 
 PLANAR = read_parameters(ROOT / "config" / "planar_arms.yaml")
 TEXTS = {

@@ -10,8 +10,8 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.efforts import EffortCodec
-from noninteract_ros.nodes.robot_states import DriverStateCodec
+from noninteract_ros.nodes.common.efforts import EffortCodec
+from noninteract_ros.nodes.controller.robot_states import DriverStateCodec
 
 STAMP = 1_763_790_000_123_456_789
 

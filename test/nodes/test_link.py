@@ -10,10 +10,10 @@ from repository import ROOT
 from std_msgs.msg import Float64MultiArray
 from waiting import until
 
-from noninteract_ros.operator.bilateral import LinkAccount
-from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
+from noninteract_ros.scenario.rehearsal import Rehearsal
+from noninteract_ros.sources.link.bilateral import LinkAccount
 
 END = 0.4
 

@@ -10,8 +10,8 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes import cdr, messages
-from noninteract_ros.nodes.messages import EnergyCodec, Level, Marker, SubtaskCodec
+from noninteract_ros.nodes.messages import cdr, messages
+from noninteract_ros.nodes.messages.messages import EnergyCodec, Level, Marker, SubtaskCodec
 
 STAMP = 3_000_000_007
 EDGES = ("robot_1-robot_2", "robot_2-robot_3")

@@ -18,7 +18,7 @@ from repository import ROOT
 from waiting import DEADLINE, until
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.nodes.parameter_files import dump, rewrite
+from noninteract_ros.nodes.common.parameter_files import dump, rewrite
 
 PAPER = str(ROOT / "config" / "paper.yaml")
 NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]

@@ -19,10 +19,10 @@ from std_msgs.msg import Bool
 from waiting import DEADLINE, until
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.nodes.joy_operator import JoyOperator
-from noninteract_ros.nodes.keyboard_operator import KeyboardOperator
-from noninteract_ros.nodes.pose_operator import PoseOperator
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.nodes.sources.joy_operator import JoyOperator
+from noninteract_ros.nodes.sources.keyboard_operator import KeyboardOperator
+from noninteract_ros.nodes.sources.pose_operator import PoseOperator
+from noninteract_ros.scenario.files import read_parameters
 
 ENABLE = 9
 FORWARD = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]

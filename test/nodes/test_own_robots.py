@@ -12,8 +12,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from waiting import until
 
-from noninteract_ros.nodes.cdr import JointStateCodec
-from noninteract_ros.nodes.messages import SubtaskCodec
+from noninteract_ros.nodes.messages.cdr import JointStateCodec
+from noninteract_ros.nodes.messages.messages import SubtaskCodec
 from noninteract_ros.scenario import Scenario
 
 # The clock on the wall decides nothing in these tests.

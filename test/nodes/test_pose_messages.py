@@ -8,8 +8,8 @@ from rclpy.serialization import deserialize_message, serialize_message
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes import cdr, messages
-from noninteract_ros.nodes.messages import SubtaskCodec
+from noninteract_ros.nodes.messages import cdr, messages
+from noninteract_ros.nodes.messages.messages import SubtaskCodec
 
 STAMP = 3_000_000_007
 POSE = SubtaskCodec("cooperative", ["cooperative"], ("x", "y", "z"), rotates=True)

@@ -20,12 +20,12 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
-from noninteract_ros.analysis.repair import repair
-from noninteract_ros.analysis.run import Run
 from noninteract_ros.errors import RecordingError
-from noninteract_ros.nodes.descriptions import LATCHED_QOS
-from noninteract_ros.nodes.feed import SequenceCheck
-from noninteract_ros.nodes.recorder import RecorderNode
+from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
+from noninteract_ros.nodes.recording.feed import SequenceCheck
+from noninteract_ros.nodes.recording.recorder import RecorderNode
+from noninteract_ros.reporting.recording.repair import repair
+from noninteract_ros.reporting.recording.run import Run
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 DOMAIN = 60 + WORKER % 10
@@ -80,7 +80,7 @@ def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., subprocess.
 
 def recorder_arguments(**parameters: object) -> list[str]:
     given = [item for key, value in parameters.items() for item in ("-p", f"{key}:={value}")]
-    return ["-m", "noninteract_ros.nodes.recorder", "--ros-args", *given]
+    return ["-m", "noninteract_ros.nodes", "recorder", "--ros-args", *given]
 
 
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])

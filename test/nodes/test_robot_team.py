@@ -14,9 +14,9 @@ from std_srvs.srv import SetBool, Trigger
 from waiting import until
 
 from noninteract_ros.clock import tick_stamp
-from noninteract_ros.nodes.cdr import JointStateCodec
-from noninteract_ros.nodes.descriptions import LATCHED_QOS
-from noninteract_ros.nodes.messages import to_wrench_stamped
+from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
+from noninteract_ros.nodes.messages.cdr import JointStateCodec
+from noninteract_ros.nodes.messages.messages import to_wrench_stamped
 
 JOINTS = ["robot_1/x", "robot_1/y", "robot_2/x", "robot_2/y"]
 ALONE: dict[str, Any] = {"object": None, "haptic": None, "planner": None, "lockstep_sources": None}

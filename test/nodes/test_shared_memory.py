@@ -6,7 +6,7 @@ import os
 import time
 from pathlib import Path
 
-from noninteract_ros.nodes.shared_memory import YOUNG, remove_abandoned
+from noninteract_ros.nodes.stack.shared_memory import YOUNG, remove_abandoned
 
 
 def segment(folder: Path, name: str, age: float) -> Path:

@@ -3,8 +3,8 @@
 
 from harness import paper
 
-from noninteract_ros.control.inputs import Source
-from noninteract_ros.nodes.lockstep import SourceWatch
+from noninteract_ros.control.references.inputs import Source
+from noninteract_ros.nodes.common.lockstep import SourceWatch
 from noninteract_ros.scenario import Scenario
 
 NAME = "cooperative/human"

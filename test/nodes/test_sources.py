@@ -9,8 +9,8 @@ from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 from waiting import until
 
-from noninteract_ros.nodes.cdr import JointStateCodec
-from noninteract_ros.nodes.messages import Marker, ParsedReference, SubtaskCodec
+from noninteract_ros.nodes.messages.cdr import JointStateCodec
+from noninteract_ros.nodes.messages.messages import Marker, ParsedReference, SubtaskCodec
 
 JOINTS = ["robot_1/x", "robot_1/y", "robot_2/x", "robot_2/y"]
 MS = 10**6

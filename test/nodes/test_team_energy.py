@@ -15,7 +15,7 @@ from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from waiting import until
 
-from noninteract_ros.nodes.team_energy import LABELS, unsound
+from noninteract_ros.nodes.controller.team_energy import LABELS, unsound
 
 
 def door(**changes: Any) -> dict[str, Any]:

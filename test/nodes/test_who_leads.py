@@ -13,7 +13,7 @@ from rclpy.parameter import Parameter
 from std_msgs.msg import String
 from waiting import until
 
-from noninteract_ros.nodes.operator_console import OperatorConsole
+from noninteract_ros.nodes.console.operator_console import OperatorConsole
 
 PLAN = {"hand_over_times": [0.5, 2.5], "hand_over_to": ["human", "hold"]}
 

@@ -12,9 +12,9 @@ from repository import ROOT
 from waiting import until
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.rehearsal import History, Rehearsal, rehearse
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
+from noninteract_ros.scenario.rehearsal import History, Rehearsal, rehearse
 
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo comes with the extra [peer]")
 

@@ -14,8 +14,8 @@ from noninteract_ros.simulation.integrator import runge_kutta_step
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.push import ScheduledPush
 from noninteract_ros.simulation.team_simulation import TeamSimulation
-from noninteract_ros.team.planar_arm import PlanarArm
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models.planar_arm import PlanarArm
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team
 
 STEP = 0.05  # [s] for which a control torque holds

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from noninteract_ros.control.safety_watch import SafetyWatch
+from noninteract_ros.control.telemetry.limit_activity import LimitActivity
 from noninteract_ros.control.tick import Tick
-from noninteract_ros.rehearsal import Rehearsal
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
+from noninteract_ros.scenario.rehearsal import Rehearsal
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 
@@ -34,7 +34,7 @@ class Provoked:
         self.scenario = Scenario.from_dict(values)
         self.rehearsal = Rehearsal(self.scenario)
         self.team = self.rehearsal.team
-        self.watch = SafetyWatch(self.team.joint_names)
+        self.watch = LimitActivity(self.team.joint_names)
         self.ticks: list[Tick] = []
         self._wrenches: list[np.ndarray] = []
         self.told: list[list[str]] = [[]]

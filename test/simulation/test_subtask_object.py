@@ -8,10 +8,10 @@ import pytest
 import yaml
 from scipy.integrate import solve_ivp
 
-from noninteract_ros.control.reference import Reference
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.simulation.subtask_object import ObjectSettings, SubtaskObject
+from noninteract_ros.subtasks.reference import Reference
 
 PAPER = Path(__file__).resolve().parents[2] / "config" / "paper.yaml"
 DURATION = 1.2

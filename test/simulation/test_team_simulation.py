@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.push import ScheduledPush
 from noninteract_ros.simulation.team_simulation import TeamSimulation
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team
 
 ARMS = PlanarArms(gravity=9.81)

@@ -9,15 +9,15 @@ import pytest
 from harness import merged
 from repository import ROOT
 
-from noninteract_ros.analysis.identities import identities
-from noninteract_ros.analysis.law_probe import LawProbe
-from noninteract_ros.control.inputs import Target
+from noninteract_ros.control.references.inputs import Target
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.rehearsal import Rehearsal, rehearse
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
-from noninteract_ros.subtasks.elbow_angle import ElbowAngle
+from noninteract_ros.scenario.files import read_parameters
+from noninteract_ros.scenario.rehearsal import Rehearsal, rehearse
+from noninteract_ros.subtasks.kinds.elbow_angle import ElbowAngle
 from noninteract_ros.team.team import Team
+from noninteract_ros.validation.identities.identities import identities
+from noninteract_ros.validation.identities.law_probe import LawProbe
 
 STEP = 1e-6
 FRAMES = {"shoulder": ["panda_link2"], "elbow": ["panda_link4"], "wrist": ["panda_link6"]}

@@ -10,15 +10,15 @@ from spatial_arms import random_state, spatial_arm, spatial_team
 
 from noninteract_ros.errors import ScenarioError, SubtaskError
 from noninteract_ros.subtasks import so3
-from noninteract_ros.subtasks.cooperative_pose import CooperativeOrientation, CooperativePose
-from noninteract_ros.subtasks.cooperative_position import CooperativePosition
-from noninteract_ros.subtasks.posture import Posture
-from noninteract_ros.subtasks.relative_pose import RelativeOrientation, RelativePose
-from noninteract_ros.subtasks.relative_position import RelativePosition
+from noninteract_ros.subtasks.kinds.cooperative_pose import CooperativeOrientation, CooperativePose
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.posture import Posture
+from noninteract_ros.subtasks.kinds.relative_pose import RelativeOrientation, RelativePose
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.subtasks.team_rotation import TeamRotation
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team, TeamState
 
 STEP = 1e-6

@@ -7,8 +7,8 @@ from own_kinds import Distance, Unfinished
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.subtasks import registry
-from noninteract_ros.subtasks.registry import kind_named, register_kind
+from noninteract_ros.subtasks.kinds import registry
+from noninteract_ros.subtasks.kinds.registry import kind_named, register_kind
 
 STEP = 1e-6
 

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from noninteract_ros.errors import SubtaskError
-from noninteract_ros.subtasks.cooperative_position import CooperativePosition
-from noninteract_ros.subtasks.relative_position import RelativePosition
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.subtasks.subtask import Subtask
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team
 
 

@@ -6,9 +6,9 @@ import pytest
 from planar_arms import arm
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.subtasks.cooperative_position import CooperativePosition
-from noninteract_ros.subtasks.relative_position import RelativePosition
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team
 
 STEP = 1e-6

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from noninteract_ros.team.assembler import StateAssembler
+from noninteract_ros.team.state_assembler import StateAssembler
 
 NAMES = ["left/a", "left/b", "right/a", "right/b"]
 LEFT, RIGHT = np.array([0, 1]), np.array([2, 3])

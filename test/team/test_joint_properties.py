@@ -8,9 +8,9 @@ import pytest
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.schema import load
-from noninteract_ros.team.joining import append_model
-from noninteract_ros.team.planar_arm import PlanarArm
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.joined_model import append_model
+from noninteract_ros.team.models.planar_arm import PlanarArm
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.team import Team
 

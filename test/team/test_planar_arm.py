@@ -8,10 +8,10 @@ import pytest
 from planar_arms import PlanarArms
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.rehearsal import Rehearsal
-from noninteract_ros.scenario_file import load_scenario
+from noninteract_ros.scenario.files import load_scenario
+from noninteract_ros.scenario.rehearsal import Rehearsal
 from noninteract_ros.schema import load
-from noninteract_ros.team.planar_arm import PlanarArm
+from noninteract_ros.team.models.planar_arm import PlanarArm
 from noninteract_ros.team.team import Team
 
 SCENARIO = Path(__file__).resolve().parents[2] / "config" / "planar_arms.yaml"

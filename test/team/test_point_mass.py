@@ -4,7 +4,7 @@
 import pytest
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models.point_mass import PointMass
 
 
 @pytest.mark.parametrize("axes", [(), ("x", "x"), ("x", "y", "x")])

@@ -6,7 +6,7 @@ import pytest
 from planar_arms import PlanarArms, arm
 
 from noninteract_ros.errors import TeamError
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team
 
 STEP = 1e-6

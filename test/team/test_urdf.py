@@ -10,14 +10,14 @@ import yaml
 from planar_arms import UNLIKE, PlanarArms
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.scenario_file import load_scenario
+from noninteract_ros.scenario.files import load_scenario
 from noninteract_ros.schema import load
-from noninteract_ros.team import urdf_files
-from noninteract_ros.team.planar_arm import PlanarArm
-from noninteract_ros.team.point_mass import PointMass
+from noninteract_ros.team.models import urdf_files as urdf_files
+from noninteract_ros.team.models.planar_arm import PlanarArm
+from noninteract_ros.team.models.point_mass import PointMass
+from noninteract_ros.team.models.urdf_robot import UrdfRobot
 from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.team import Team
-from noninteract_ros.team.urdf import UrdfRobot
 
 STEP = 1e-6
 PANDA = "example-robot-data/panda_description/urdf/panda.urdf"

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from noninteract_ros.schema import load
-from noninteract_ros.team.planar_arm import PlanarArm
-from noninteract_ros.team.point_mass import PointMass
-from noninteract_ros.team.registry import RobotBlock
+from noninteract_ros.team.models.planar_arm import PlanarArm
+from noninteract_ros.team.models.point_mass import PointMass
+from noninteract_ros.team.models.registry import RobotBlock
+from noninteract_ros.team.models.urdf_robot import UrdfRobot
 from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.team import Team
-from noninteract_ros.team.urdf import UrdfRobot
 
 THREE_LINKS = {"link_lengths": [0.7, 0.4, 0.2], "link_masses": [3.0, 1.2, 0.4]}
 BLOCKS: dict[str, RobotBlock] = {

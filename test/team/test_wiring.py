@@ -8,7 +8,7 @@ from repository import ROOT
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario_file import read_parameters
+from noninteract_ros.scenario.files import read_parameters
 
 OWN = ROOT / "config" / "own_robots.yaml"
 

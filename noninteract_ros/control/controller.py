@@ -1,0 +1,310 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The controller of a team, without ROS: states and inputs in, torques and accounts out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.active_law import ActiveLaw
+from noninteract_ros.control.energy.external_torque import ExternalTorque
+from noninteract_ros.control.energy.gate import GATED, EnergyGate, TickTerms
+from noninteract_ros.control.energy.stiffness_ramp import StiffnessRamp
+from noninteract_ros.control.energy.storage import Energy, energy
+from noninteract_ros.control.energy.tank import TankSettings
+from noninteract_ros.control.evaluator import make_evaluator
+from noninteract_ros.control.fast.compiled_layout import CompiledLayout
+from noninteract_ros.control.law.decoupling import TaskError
+from noninteract_ros.control.law.force_goal import ForceGoals
+from noninteract_ros.control.law.gated_law import decoupling, without_law
+from noninteract_ros.control.law.impedance import ImpedanceSettings, stack_impedance
+from noninteract_ros.control.law.team_dynamics import Evaluation, TeamEvaluator
+from noninteract_ros.control.references.subtask_input import (
+    InputSettings,
+    SubtaskCommand,
+    SubtaskInput,
+)
+from noninteract_ros.control.safety.continuity import Continuity
+from noninteract_ros.control.safety.joint_limits import JointSafety
+from noninteract_ros.control.safety.settings import SafetySettings
+from noninteract_ros.control.safety.singularity import SingularityGuard, best_regularity
+from noninteract_ros.control.safety.singularity_escape import SingularityEscape
+from noninteract_ros.control.safety.stop import Stop
+from noninteract_ros.control.tick import Mode, Tick
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.team.team import Team
+
+DEFAULT_SAFETY, DEFAULT_TANK = SafetySettings(), TankSettings()
+
+
+class TeamController:
+    """Leads a team's subtasks: decoupling, impedance, authority, bumpless changes.
+
+    Args:
+        team: The robots.
+        stack: Their subtasks.
+        law: One of `decoupling.LAWS`.
+        impedances: Gains, by subtask in the stack's order.
+        inputs: Authority, timeouts and limits, in the same order.
+        transition_time: How long a change of law or gains fades in [s].
+        stop_rate: Decay rate of fast motions after a stop, once it is in full force [1/s].
+        state_timeout: Gap between states after which every subtask starts anew [s].
+        safety: Behaviour at singularities and joint limits.
+        tank: Capacity, levels and rates of the energy account.
+        measured: Whether wrenches on the tools will be given; else a momentum observer estimates
+            what acts from outside.
+    """
+
+    def __init__(
+        self,
+        team: Team,
+        stack: SubtaskStack,
+        law: str,
+        impedances: Sequence[ImpedanceSettings],
+        inputs: Sequence[InputSettings],
+        transition_time: float = 0.2,
+        stop_rate: float = 30.0,
+        state_timeout: float = 0.2,
+        safety: SafetySettings = DEFAULT_SAFETY,
+        tank: TankSettings = DEFAULT_TANK,
+        measured: bool = True,
+    ) -> None:
+        self.team, self.stack = team, stack
+        self._layout = CompiledLayout(stack.layout)
+        self._settings = list(impedances)
+        self.inputs: Mapping[str, SubtaskInput] = {
+            task.name: SubtaskInput(task, settings)
+            for task, settings in zip(stack.subtasks, inputs, strict=True)
+        }
+        self._mode = Mode(law, stack_impedance(stack.subtasks, impedances))
+        self._continuity = Continuity(team, state_timeout)
+        self.gate = EnergyGate(team, stack, tank)
+        self.outside = ExternalTorque(team, measured, tank.observer_gain)
+        self._springs, self._goals = StiffnessRamp(transition_time), ForceGoals(team.n)
+        max_jerk = np.concatenate([item.max_jerk for item in self.inputs.values()])
+        self._law = ActiveLaw(self.gate, self._goals, transition_time, Stop(stop_rate, max_jerk))
+        best = best_regularity(team, stack)
+        scout = SingularityEscape(team, stack, best, safety.singularity_begin)
+        self._guard = SingularityGuard(team, safety, best, scout)
+        self._safety = JointSafety(team, safety)
+
+    @cached_property
+    def _view(self) -> TeamEvaluator:
+        """How states are evaluated."""
+        return make_evaluator(self.team, self.stack)
+
+    def prepare(self) -> None:
+        """Has everything compiled that a step needs; otherwise the first step waits for that."""
+        self._layout.prepare()
+        _ = self._view
+
+    @property
+    def mode(self) -> Mode:
+        """Law, gains and stop in force."""
+        return self._mode
+
+    def set_law(self, law: str) -> None:
+        """Changes the law without a bump; the gated one begins with a fresh account."""
+        if law == GATED and self._mode.law != law:
+            self.gate.restart()
+        self._change(replace(self._mode, law=law))
+
+    def set_impedance(self, subtask: str, settings: ImpedanceSettings) -> None:
+        """Changes one subtask's gains without a bump.
+
+        Raises:
+            ScenarioError: The gains do not fit the subtask; nothing is changed.
+        """
+        changed = list(self._settings)
+        changed[self.stack.names.index(subtask)] = settings
+        impedance = stack_impedance(self.stack.subtasks, changed)
+        self._springs.forget()
+        if self._mode.law == GATED:
+            impedance = self._springs.begin(self._mode.impedance, impedance)
+        self._change(replace(self._mode, impedance=impedance))
+        self._settings = changed
+
+    @property
+    def feels(self) -> bool:
+        """Whether a force is regulated, so that each step needs to know the external one."""
+        return bool(self._mode.impedance.goal_gain.any())
+
+    @property
+    def springs_waiting(self) -> float | None:
+        """Progress of a change of stiffness that waits for energy, 0 to 1; None without any."""
+        return self._springs.waiting
+
+    def set_authority(self, subtask: str, authority: str) -> None:
+        """Hands one subtask to another source without a bump."""
+        self.inputs[subtask].authority = authority
+
+    def stop(self) -> None:
+        """Damps the team to rest and ignores every input until `resume`."""
+        self._change(replace(self._mode, stopped=True))
+
+    def resume(self) -> None:
+        """Leaves a stop: every subtask holds where it is until it hears from its source."""
+        self._forget_inputs()
+        self._change(replace(self._mode, stopped=False))
+
+    def reset(self) -> None:
+        """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
+        self._continuity.forget()
+        self._law.forget()
+        self.gate.restart()
+        self._safety.reset()
+        for item in self.inputs.values():
+            item.reset()
+
+    def put_back(self) -> None:
+        """The team stands at its start again, its time goes on; subtasks hold until led anew."""
+        self._continuity.put_back()
+        self._law.forget()  # What still fades would push the team from where it was put.
+        self.gate.restart()
+        self._forget_inputs()
+
+    def _forget_inputs(self) -> None:
+        for item in self.inputs.values():
+            item.forget()
+
+    def _change(self, mode: Mode) -> None:
+        self._law.left = self._law.left or self._mode
+        self._mode = mode
+
+    def step(
+        self,
+        now: float,
+        q: Array,
+        v: Array,
+        applied: Array | None = None,
+        wrenches: Array | None = None,
+    ) -> Tick:
+        """Torque for the time from `now` to the next tick.
+
+        Args:
+            now: Time of the state [s]; later than at the last step.
+            q: Configuration, shape (nq,).
+            v: Velocity, shape (n,).
+            applied: Torque that the team reports to have had until now, shape (n,); None, if it
+                was the last one that was asked for.
+            wrenches: On the tools, as far as they are measured, shape (N, 6) [N, N m].
+        """
+        seen = self._view.evaluate(q, v, self._mode.impedance.inertias)
+        restarted = self._continuity.broken(now, q, v)
+        elapsed = self._continuity.elapsed(now)
+        step = 0.0 if restarted else elapsed
+        # At the tick of a stop the inputs still count, so that the torque starts without a step.
+        left = self._law.left
+        stopped = self._mode.stopped and (left is None or left.stopped)
+        # Who looks for a way out of a singularity must not hold what lies inside it.
+        lost = self._guard.lost
+        if restarted or stopped or lost or (left and left.stopped):
+            self._rest_at(seen.task.x)
+        if restarted:
+            self._guard.reset()
+            self._goals.forget()
+            self.outside.reset()
+            self.gate.pause()
+        led = tuple(
+            item.resting(now) if stopped else item.advance(now, step)
+            for item in self.inputs.values()
+        )
+        regular = self._guard.relative(seen.dynamics.inverse_sizes)
+        relative = min(regular, self.stack.soundness(seen.state))
+        share = self._guard.law_share(relative)
+        self.outside.see(step, q, v, applied)
+        changing = self._law.changing(now) or self._springs.changing
+        moment = self._moment(now, seen, led, share, step)
+        if share == 1.0:
+            self.gate.book(moment, self._mode.law, applied)
+        recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
+        acceleration, wanted = self._law.blended(
+            self._mode, self._view, seen, moment, share, recovery
+        )
+        asked = seen.dynamics.torque(seen.state.v, wanted)
+        torque, safety = self._safety.protect(q, v, asked, seen.state.g, elapsed)
+        self._law.remember(self._mode, moment, torque, acceleration, share, safety)
+        self._regulate(seen, wrenches, step, held=share < 1.0 or safety.acted)
+        self._continuity.note(now, q)
+        self.outside.note(torque)
+        return Tick(
+            torque,
+            seen.state,
+            seen.task,
+            moment.error.e_rate + moment.error.reference_velocity,
+            moment.error,
+            led,
+            seen.dynamics,
+            acceleration,
+            moment.added.feedback,
+            share,
+            relative,
+            torque - asked,
+            safety,
+            restarted,
+            self.gate.account,
+            self._mode.law,
+            bool(restarted) or self._mode.stopped or changing,
+        )
+
+    def _regulate(self, seen: Evaluation, wrenches: Array | None, step: float, held: bool) -> None:
+        """Integrates what is missing of the force goals, unless something holds the law back."""
+        if not self.feels:
+            return
+        held = held or self._mode.stopped or self.gate.account.closing
+        pressing = -seen.dynamics.force_of(self.outside.torque(seen.state, wrenches))
+        self._goals.advance(self._mode.impedance, pressing, step, held)
+
+    def _moment(
+        self,
+        now: float,
+        seen: Evaluation,
+        led: Sequence[SubtaskCommand],
+        share: float,
+        step: float,
+    ) -> TickTerms:
+        """This tick as law and account see it, with springs that wait one step further."""
+        error = self._error(seen, led)
+        tank = self.gate.tank if self._mode.law == GATED else None
+        impedance = self._springs.advance(
+            self._mode.impedance, error.e, step, tank, self.gate.settings
+        )
+        if impedance is not self._mode.impedance:
+            self._mode = replace(self._mode, impedance=impedance)
+        references = [item.reference for item in led]
+        added = (decoupling if share > 0.0 else without_law)(seen.dynamics, error, impedance)
+        q, x = seen.state.q, seen.task.x
+        return TickTerms(now, q, x, references, error, seen.dynamics, impedance, added)
+
+    def energy(self, tick: Tick, external_torque: Array) -> Energy:
+        """Storage functions (32) and their rates (33) of a tick.
+
+        What the limits of the joints add to the torque acts on the subtasks as if from outside.
+
+        Args:
+            tick: What `step` returned.
+            external_torque: tau_e on the joints, shape (n,) [N or N m].
+        """
+        return energy(
+            tick.dynamics,
+            tick.error,
+            self._mode.impedance,
+            tick.task_acceleration,
+            external_torque + tick.added_torque,
+        )
+
+    def _rest_at(self, x: Array) -> None:
+        for item, part in zip(self.inputs.values(), self.stack.value_slices, strict=True):
+            item.rest_at(x[part])
+
+    def _error(self, seen: Evaluation, led: Sequence[SubtaskCommand]) -> TaskError:
+        position = np.concatenate([item.reference.position for item in led])
+        velocity = np.concatenate([item.reference.velocity for item in led])
+        acceleration = np.concatenate([item.reference.acceleration for item in led])
+        force = np.concatenate([item.force for item in led])
+        e = self._layout.difference(seen.task.x, position)
+        e_rate = seen.dynamics.velocity(seen.state.v) - velocity
+        goal = self._goals.wanted(self._mode.impedance)
+        return TaskError(e, e_rate, velocity, acceleration, force, goal)

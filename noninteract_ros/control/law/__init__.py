@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The control laws and the impedance of the subtasks, in dense form."""

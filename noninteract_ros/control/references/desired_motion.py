@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The desired motion of one subtask: continuous whoever asks for it, and at rest when nobody does.
+
+Set-points, rates, take-overs and stops are shaped by ruckig within bounds of velocity,
+acceleration and jerk. A full reference passes unchanged once it has been taken over. Rotations are
+shaped as rotation vectors from where they are to go, which leads along SO(3) with the exact
+derivatives; their angular velocity is never faster than the rotation vector changes.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from ruckig import ControlInterface, InputParameter, OutputParameter, Result, Ruckig, RuckigError
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.references.inputs import MotionInput, Rate, Target
+from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.reference import Reference
+
+LONGEST = 1000.0  # [s] how far ahead a motion is planned
+
+
+class MotionShaper:
+    """One step at a time towards a state, within limits; all numbers are plain.
+
+    An acceleration beyond the limit comes back with bounded jerk. Where no way to a set-point can
+    be planned the motion slows down, and where not even that can be, it rests.
+
+    Args:
+        limits: Bounds of velocity, acceleration and jerk, shape (3, p).
+    """
+
+    def __init__(self, limits: Array) -> None:
+        dim = limits.shape[1]
+        self._generator = Ruckig(dim, 1.0)
+        self._input, self._output = InputParameter(dim), OutputParameter(dim)
+        self._input.max_velocity, self._input.max_acceleration, self._input.max_jerk = limits
+        self._max_velocity = limits[0]
+
+    def towards(self, start: Reference, target: Target, step: float) -> tuple[Reference, bool]:
+        """State `step` seconds on the way to a set-point, and whether it is reached."""
+        self._input.control_interface = ControlInterface.Position
+        reach = LONGEST * self._max_velocity
+        away = np.clip(target.position - start.position, -reach, reach)
+        near = np.abs(away) < reach
+        self._input.target_position = np.where(near, target.position, start.position + away)
+        planned = self._advance(start, target.velocity, step)
+        return planned or self.at_rate(start, np.zeros_like(start.velocity), step)
+
+    def at_rate(self, start: Reference, rate: Array, step: float) -> tuple[Reference, bool]:
+        """State `step` seconds on the way to a velocity, and whether it is reached."""
+        self._input.control_interface = ControlInterface.Velocity
+        return self._advance(start, rate, step) or (Reference.still(start.position), False)
+
+    def _advance(
+        self, start: Reference, speed: Array, step: float
+    ) -> tuple[Reference, bool] | None:
+        self._generator.delta_time = step
+        self._input.current_position = start.position
+        self._input.current_velocity = start.velocity
+        self._input.current_acceleration = start.acceleration
+        self._input.target_velocity = np.clip(speed, -self._max_velocity, self._max_velocity)
+        try:
+            result = self._generator.update(self._input, self._output)
+        except (RuckigError, ValueError):  # ValueError: it has no name for some of its failures.
+            result = Result.Error
+        if result not in (Result.Working, Result.Finished):
+            return None
+        reached = Reference(
+            np.array(self._output.new_position),
+            np.array(self._output.new_velocity),
+            np.array(self._output.new_acceleration),
+        )
+        return reached, result == Result.Finished
+
+
+class AccelerationCarryOver:
+    """How much of an acceleration a motion goes on with after its source has left it.
+
+    To lead an acceleration a back by the jerk j takes the velocity on by a^2 / (2 j). Twice of
+    what a motion within the limits can have, as where two of them part, is led back in any case;
+    more only as far as the velocity stays within its limit. What is beyond is cut at once: the
+    limits of jerk and velocity contradict each other there, and the motion would go far astray.
+
+    Args:
+        limits: Bounds of velocity, acceleration and jerk, shape (3, p).
+    """
+
+    def __init__(self, limits: Array) -> None:
+        self._max_velocity, max_acceleration, self._max_jerk = limits
+        # From rest to full velocity no more is needed, however much is allowed.
+        needed = np.minimum(max_acceleration, np.sqrt(self._max_jerk * self._max_velocity))
+        self._twice = np.maximum(max_acceleration, 2.0 * needed)
+
+    def of(self, left: Reference, base: Reference | None = None) -> Reference:
+        """A motion with the acceleration that it goes on with, as seen from another one."""
+        velocity, acceleration = left.velocity, left.acceleration
+        if base is not None:
+            velocity, acceleration = velocity - base.velocity, acceleration - base.acceleration
+        ahead = self._max_velocity - np.sign(acceleration) * velocity
+        room = np.clip(ahead, 0.0, 2.0 * self._max_velocity)
+        bound = np.maximum(self._twice, np.sqrt(2.0 * self._max_jerk * room))
+        beyond = acceleration - np.clip(acceleration, -bound, bound)
+        return replace(left, acceleration=left.acceleration - beyond) if beyond.any() else left
+
+
+class DesiredMotion:
+    """What a subtask is to do now.
+
+    Args:
+        limits: Bounds of velocity, acceleration and jerk, shape (3, p).
+        direct: Whether a full reference is taken over at once, with the jump it brings, instead
+            of being approached from where the desired motion is.
+        layout: Layout of the subtask's values; plain numbers, if None.
+    """
+
+    def __init__(self, limits: Array, direct: bool, layout: Layout | None = None) -> None:
+        layout = layout or Layout.numbers(limits.shape[1])
+        self._limits, self._direct, self._layout = limits, direct, layout
+        self._shaper, self._inheritance = MotionShaper(limits), AccelerationCarryOver(limits)
+        self._zero = Target(np.zeros(layout.dim), np.zeros(layout.dim))
+        self.rest_at(layout.identity)
+
+    @property
+    def now(self) -> Reference:
+        """Desired position, velocity and acceleration at the last tick."""
+        return self._now
+
+    def rest_at(self, x: Array) -> None:
+        """Starts anew: at rest at x, shape (size,)."""
+        self._now = Reference.still(x, self._layout)
+        self._followed: Reference | None = None
+        self._gap: Reference | None = None
+        self._chart: tuple[Array, Reference] | None = None
+
+    def advance(self, motion: MotionInput | None, step: float) -> Reference:
+        """Desired motion one tick later.
+
+        Args:
+            motion: What the source in force asks for (a full reference as of this tick), or None.
+            step: Time since the last tick [s].
+        """
+        if isinstance(motion, Reference):
+            self._chart = None
+            self._now = self._follow(motion, step)
+            self._followed = motion
+            return self._now
+        if self._followed is not None:
+            self._now = self._inheritance.of(self._now)
+        self._followed = self._gap = None
+        if step > 0.0:
+            self._now = self._shape(motion, step)
+        return self._now
+
+    def _shape(self, motion: Target | Rate | None, step: float) -> Reference:
+        if isinstance(motion, Target):
+            shaped, done = self._towards(motion, step)
+            if not done or motion.velocity.any():
+                return shaped
+            self._chart = None
+            return Reference.still(motion.position, self._layout)
+        self._chart = None
+        if isinstance(motion, Rate):
+            return self._at_rate(motion.velocity, step)[0]
+        if not (self._now.velocity.any() or self._now.acceleration.any()):
+            return self._now
+        shaped, done = self._at_rate(self._zero.velocity, step)
+        return Reference.still(shaped.position, self._layout) if done else shaped
+
+    def _towards(self, target: Target, step: float) -> tuple[Reference, bool]:
+        """Shapes in coordinates about the target's rotations, which are zero there.
+
+        The coordinates are kept from tick to tick: ruckig fails now and then where a state that
+        it has made itself comes back with another rounding.
+        """
+        layout = self._layout
+        origin = Reference.still(layout.origin(target.position), layout)
+        goal = Target(layout.difference(target.position, origin.position), target.velocity)
+        if self._chart is not None and np.array_equal(self._chart[0], origin.position):
+            start = self._chart[1]
+        else:
+            start = self._now.minus(origin, layout)
+        shaped, done = self._shaper.towards(start, goal, step)
+        self._chart = (origin.position, shaped)
+        return origin.plus(shaped, layout), done
+
+    def _at_rate(self, rate: Array, step: float) -> tuple[Reference, bool]:
+        """Shapes in coordinates about the rotations that it has."""
+        layout = self._layout
+        origin = Reference.still(layout.origin(self._now.position), layout)
+        shaped, done = self._shaper.at_rate(self._now.minus(origin, layout), rate, step)
+        return origin.plus(shaped, layout), done
+
+    def _follow(self, motion: Reference, step: float) -> Reference:
+        """The reference plus a gap that closes smoothly; no gap in a direct take-over."""
+        if self._direct:
+            return motion
+        if self._jumps(motion, step):
+            before = motion.at(-step, self._layout)
+            self._gap = self._inheritance.of(self._now, before).minus(before, self._layout)
+        if self._gap is not None and step > 0.0:
+            self._gap, closed = self._shaper.towards(self._gap, self._zero, step)
+            if closed:
+                self._gap = None
+        return motion if self._gap is None else motion.plus(self._gap, self._layout)
+
+    def _jumps(self, motion: Reference, step: float) -> bool:
+        """Whether a reference is new or leaves its own path by more than the limits allow."""
+        if self._followed is None:
+            return True
+        away, velocity = motion.departure(self._followed, step, self._layout)
+        max_velocity, max_acceleration, _ = self._limits
+        return bool(
+            (np.abs(away) > max_velocity * step).any()
+            or (np.abs(velocity) > max_acceleration * step).any()
+        )

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a human or an autonomous source can ask of a subtask, and who is heard."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.errors import InputError
+from noninteract_ros.subtasks.reference import Reference
+
+SOURCES = ("human", "autonomy")
+HORIZON = 1.0  # [s] how far ahead of the team's time an input may be stamped
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A set-point to reach within the subtask's limits.
+
+    Attributes:
+        position: Where to go, shape (size,) [m; quaternions].
+        velocity: Velocity to have there, shape (p,) [m/s; rad/s].
+    """
+
+    position: Array
+    velocity: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """A velocity to reach within the subtask's limits, shape (p,) [m/s; rad/s]."""
+
+    velocity: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Force:
+    """A force input tau~_c (remark 1), shape (p,) [N; N m]."""
+
+    force: Array
+
+
+MotionInput = Reference | Target | Rate
+
+
+class Source:
+    """The inputs of one source to one subtask, in the order of their stamps.
+
+    Attributes:
+        heard_until: The source has said all it wants to say up to this time [s].
+    """
+
+    def __init__(self) -> None:
+        self.heard_until = -np.inf
+        self._motions: deque[tuple[float, MotionInput]] = deque()
+        self._forces: deque[tuple[float, Force]] = deque()
+        self._motion: tuple[float, MotionInput] | None = None
+        self._force: tuple[float, Force] | None = None
+
+    def receive(self, stamp: float, item: MotionInput | Force, now: float) -> None:
+        """Takes an input that is to hold from `stamp` on.
+
+        Raises:
+            InputError: The stamp goes back, or lies too far ahead of `now`.
+        """
+        if isinstance(item, Force):
+            self._append(self._forces, self._force, stamp, item, now)
+        else:
+            self._append(self._motions, self._motion, stamp, item, now)
+            self.heard_until = max(self.heard_until, stamp)
+
+    @staticmethod
+    def _append(
+        queue: deque, taken: tuple[float, object] | None, stamp: float, item: object, now: float
+    ) -> None:
+        last = queue[-1] if queue else taken
+        if last is not None and stamp < last[0]:
+            raise InputError(f"stamp goes back: {stamp:.6f} s after {last[0]:.6f} s")
+        if stamp > now + HORIZON:
+            raise InputError(f"stamp {stamp:.6f} s is ahead of the team's time {now:.6f} s")
+        queue.append((stamp, item))
+
+    def silent_until(self, stamp: float) -> None:
+        """Notes that the source has nothing new to say up to `stamp` [s]."""
+        self.heard_until = max(self.heard_until, stamp)
+
+    def forget(self) -> None:
+        """Drops the inputs that have come so far."""
+        self._motions.clear()
+        self._forces.clear()
+        self._motion = self._force = None
+
+    def motion(self, now: float) -> tuple[float, MotionInput] | None:
+        """Newest motion whose stamp has come, with the stamp."""
+        while self._motions and self._motions[0][0] <= now:
+            self._motion = self._motions.popleft()
+        return self._motion
+
+    def force(self, now: float) -> tuple[float, Force] | None:
+        """Newest force whose stamp has come, with the stamp."""
+        while self._forces and self._forces[0][0] <= now:
+            self._force = self._forces.popleft()
+        return self._force

@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Stops, singularities, joint limits, and transitions without a step of torque."""

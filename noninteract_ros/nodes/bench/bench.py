@@ -1,0 +1,229 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The parts of `noninteract bench` that need ROS: the controller's node, lockstep, wall time."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+import rclpy
+from rclpy.serialization import deserialize_message, serialize_message
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.clock import seconds, tick_stamp
+from noninteract_ros.errors import ScenarioError
+from noninteract_ros.nodes.bench.programs import (
+    NAMESPACE,
+    RoundTrip,
+    command_times,
+    programs,
+    ros,
+    tick_times,
+)
+from noninteract_ros.nodes.common.node import Ticker
+from noninteract_ros.nodes.common.parameter_files import rewrite, write
+from noninteract_ros.nodes.controller.controller import Controller
+from noninteract_ros.nodes.messages.cdr import JointStateCodec
+from noninteract_ros.nodes.messages.messages import SubtaskCodec, to_wrench_stamped
+from noninteract_ros.nodes.stack.monitor import StackError
+from noninteract_ros.scenario import Scenario
+from noninteract_ros.validation.benchmarks.bench import (
+    PARTS,
+    WARM_UP,
+    BenchCase,
+    BenchSettings,
+    Row,
+    Timed,
+    bench_scenarios,
+    take_turns,
+)
+from noninteract_ros.validation.benchmarks.law import PinocchioTerms, law_rows
+from noninteract_ros.validation.benchmarks.teams import bench_teams
+
+ROUND_TRIP = "raw round trip of two processes"
+SCENARIO = "scenario.yaml"
+SLEEP = "absolute sleep alone, period error"
+
+
+class ControllerCycle:
+    """One lockstep tick of the controller's node: the bytes of all inputs in, its bytes out.
+
+    The callbacks are called as an executor would; what they publish is sent, but has no readers.
+
+    Args:
+        values: Values of a scenario.
+        material: The same scenario and its first ticks.
+        folder: Where the parameter file goes.
+    """
+
+    def __init__(self, values: Mapping[str, Any], material: BenchCase, folder: Path) -> None:
+        self._scenario = material.scenario
+        self._team = self._scenario.build_team()
+        self._stack = self._scenario.build_stack(self._team)
+        self._history = material.history
+        self._joints = JointStateCodec(self._team.joint_names)
+        self._codecs = {
+            task.name: SubtaskCodec(task.name, task.elements, task.axes, task.rotates)
+            for task in self._stack.subtasks
+        }
+        file = write(folder / SCENARIO, {**values, "lockstep": True})
+        context = rclpy.Context()
+        context.init(args=rewrite(["--ros-args", "--params-file", str(file)], folder))
+        self._node = Controller(context=context, namespace=NAMESPACE)
+        self._inputs = {
+            item.topic_name.removeprefix(f"/{NAMESPACE}/"): item
+            for item in self._node.subscriptions
+        }
+        self._tick = -1
+        self._calls: list[tuple[Callable[[Any], None], Any]] = []
+
+    def prepare(self) -> None:
+        """All messages of the next tick."""
+        self._tick += 1
+        rate = self._scenario.general.rate
+        stamp = tick_stamp(self._tick, rate)
+        row = self._tick % len(self._history.t)
+        self._calls = []
+        for source in self._scenario.general.lockstep_sources:
+            self._add(f"{source}/reference", self._reference(source.split("/")[0], stamp, row))
+        if self._tick % max(1, round(rate / self._scenario.general.telemetry_rate)) == 0:
+            for robot in self._scenario.general.force_sensors:
+                wrench = serialize_message(to_wrench_stamped(stamp, np.zeros(6)))
+                self._add(f"{robot}/external_wrench", wrench)
+        q, v = self._history.q[row], self._history.v[row]
+        positions = self._team.joints_from_configuration(q)
+        self._add("joint_states", self._joints.encode(stamp, positions, v, np.zeros_like(v)))
+
+    def _reference(self, subtask: str, stamp: int, row: int) -> bytes:
+        number = self._stack.names.index(subtask)
+        desired = self._history.desired[row][self._stack.value_slices[number]]
+        still = np.zeros(self._stack.subtasks[number].dim)
+        return self._codecs[subtask].encode(stamp, desired, still, still)
+
+    def _add(self, topic: str, data: bytes) -> None:
+        found = self._inputs[topic]
+        message = data if found.raw else deserialize_message(data, found.msg_type)
+        self._calls.append((found.callback, message))
+
+    def run(self) -> None:
+        """One tick."""
+        for take, message in self._calls:
+            take(message)
+
+    def close(self) -> None:
+        """Ends the node.
+
+        Raises:
+            StackError: It has not answered each tick, so that the times mean nothing.
+        """
+        reached = self._node.status()[2]["time [s]"]
+        self._node.destroy_node()
+        self._node.context.try_shutdown()
+        if reached != seconds(tick_stamp(self._tick, self._scenario.general.rate)):
+            raise StackError(f"the controller answered up to {reached} s of {self._tick} ticks")
+
+
+def node_rows(name: str, values: Mapping[str, Any], material: BenchCase, count: int) -> list[Row]:
+    """The controller's node on a scenario's team, and its floor."""
+    with TemporaryDirectory() as folder:
+        controller = ControllerCycle(values, material, Path(folder))
+        node, terms = f"controller node, {name}", f"Pinocchio's terms beside the node, {name}"
+        things: dict[str, Timed] = {node: controller, terms: PinocchioTerms(material)}
+        times = take_turns(things, count)
+        controller.close()
+    return [Row("node", node, times[node], terms), Row("node", terms, times[terms])]
+
+
+def measure(
+    parts: Sequence[str],
+    settings: BenchSettings,
+    begin: Callable[[str], None],
+    leave_out: Callable[[str], None],
+) -> list[Row]:
+    """Rows of some parts, in the order of `PARTS`.
+
+    Args:
+        parts: Some of `PARTS`.
+        settings: How much is measured.
+        begin: Told what is measured next.
+        leave_out: Told which scenario is left out, and why.
+    """
+    scenarios = bench_scenarios()
+    paper, teams = scenarios["paper"], bench_teams() if "law" in parts else {}
+    rows: list[Row] = []
+    chosen = scenarios if {"law", "node"} & set(parts) else {}
+    for name, values in (chosen | teams).items():
+        begin(f"law and controller node, {name}")
+        try:
+            material = BenchCase.of(values, settings.ticks + WARM_UP)
+        except ScenarioError as error:  # Models of robots are an extra.
+            leave_out(f"{name} is left out: {error}")
+            continue
+        if "law" in parts:
+            rows += law_rows(name, material, settings.ticks)
+        # Robots with topics of their own have no single state to be answered.
+        if "node" in parts and name not in teams and not material.scenario.own_states:
+            rows += node_rows(name, values, material, settings.ticks)
+    if "lockstep" in parts:
+        begin("lockstep of the real programs")
+        rows += lockstep_rows("paper", paper, settings)
+    if "wall" in parts:
+        begin("wall time")
+        rows += wall_rows("paper", paper, settings)
+    return sorted(rows, key=lambda row: PARTS.index(row.part))
+
+
+def lockstep_rows(name: str, values: Mapping[str, Any], settings: BenchSettings) -> list[Row]:
+    """Wall time per tick of the real programs, without and with the recorder, and their floor."""
+    scenario = Scenario.from_dict(values)
+    things = {False: f"lockstep tick, {name}", True: f"lockstep tick, {name}, recorded"}
+    times: dict[str, list[Array]] = {name: [] for name in (*things.values(), ROUND_TRIP)}
+    with ros(), TemporaryDirectory() as folder:
+        running = {"lockstep": True, "end_time": 0.0, "start_paused": False}
+        file = write(Path(folder) / SCENARIO, {**values, **running})
+        trip = RoundTrip(scenario.build_team().joint_names)
+        try:
+            for _ in range(settings.rounds):
+                for record, thing in things.items():
+                    times[ROUND_TRIP].append(trip.measure(settings.seconds))
+                    with programs(scenario, file, Path(folder), record) as stack:
+                        times[thing].append(tick_times(stack, settings.seconds))
+        finally:
+            trip.close()
+    rows = [
+        Row("lockstep", thing, np.concatenate(times[thing]), ROUND_TRIP)
+        for thing in things.values()
+    ]
+    return [*rows, Row("lockstep", ROUND_TRIP, np.concatenate(times[ROUND_TRIP]))]
+
+
+def wall_rows(name: str, values: Mapping[str, Any], settings: BenchSettings) -> list[Row]:
+    """Period error of the controller's commands in wall time, and that of sleeping alone."""
+    scenario = Scenario.from_dict(values)
+    loop = f"commands in wall time, {name}, period error"
+    rate = scenario.general.rate
+    times: dict[str, list[Array]] = {loop: [], SLEEP: []}
+    with ros(), TemporaryDirectory() as folder:
+        running = {"lockstep": False, "end_time": 0.0, "start_paused": False}
+        file = write(Path(folder) / SCENARIO, {**values, **running})
+        for _ in range(settings.rounds):
+            times[SLEEP].append(_errors(_sleeps(rate, settings.seconds), rate))
+            with programs(scenario, file, Path(folder), False) as stack:
+                times[loop].append(_errors(command_times(stack, settings.seconds), rate))
+    rows = {thing: np.concatenate(found) for thing, found in times.items()}
+    return [Row("wall", loop, rows[loop], SLEEP), Row("wall", SLEEP, rows[SLEEP])]
+
+
+def _sleeps(rate: float, duration: float) -> list[int]:
+    ticker, instants = Ticker(rate), []
+    for _ in range(round(rate * duration)):
+        ticker.wait()
+        instants.append(time.time_ns())
+    return instants
+
+
+def _errors(instants: list[int], rate: float) -> Array:
+    """How far each period is from the nominal one [us]."""
+    return np.abs(1e-3 * np.diff(instants) - 1e6 / rate)

@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The bare floor of lockstep: sends back every JointState that comes, as the bytes it came in."""
+
+import sys
+from collections.abc import Sequence
+
+import rclpy
+from rclpy.executors import ExternalShutdownException
+from rclpy.experimental import EventsExecutor
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+
+from noninteract_ros.nodes.common.node import LOOP_QOS, spin
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Echoes `ping` on `pong` until it is told to end."""
+    rclpy.init(args=list(sys.argv if arguments is None else arguments))
+    node = Node("echo", start_parameter_services=False, enable_rosout=False)
+    publisher = node.create_publisher(JointState, "pong", LOOP_QOS)
+    node.create_subscription(JointState, "ping", publisher.publish, LOOP_QOS, raw=True)
+    executor = EventsExecutor()
+    executor.add_node(node)
+    try:
+        spin(executor, node.context)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        rclpy.try_shutdown()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,166 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Parameter files, read before ROS reads them.
+
+What is wrong is said in one clear line, and two traps of ROS's own reader are taken away: there
+`y` is a boolean, so that `axes: [x, y]` is refused, and `[0, 1.5]` is a list of unlike items.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from noninteract_ros.errors import ScenarioError
+from noninteract_ros.scenario.files import read_yaml
+
+OPTION = "--params-file"
+OVERRIDES = ("-p", "--param")
+COMMAND_LINE = "-p"
+EVERY_NODE = "/**"
+
+
+class _Quoted(yaml.SafeDumper):
+    """Writes every text in quotes, so that no reader takes it for anything else."""
+
+
+_Quoted.add_representer(
+    str, lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", text, style='"')
+)
+
+
+def files_of(arguments: Sequence[str]) -> list[str]:
+    """Files that a ROS command line names after `--params-file`."""
+    return [value for option, value in pairwise(arguments) if option == OPTION]
+
+
+def rewrite(arguments: Sequence[str], folder: Path) -> list[str]:
+    """The same command line with parameters that ROS reads as they are meant.
+
+    Args:
+        arguments: A ROS command line.
+        folder: Where the rewritten files are put.
+
+    Raises:
+        ScenarioError: A file is missing, is no YAML, is no parameter file, or a list has unlike
+            items; the error names the file and the key.
+    """
+    result = list(arguments)
+    given: set[tuple[str, str]] = set()
+    for place in reversed(range(1, len(result))):
+        if result[place - 1] == OPTION:
+            content = _without(_checked(result[place]), given)
+            result[place] = str(folder / f"{place}.yaml")
+            Path(result[place]).write_text(dump(content))
+        elif result[place - 1] in OVERRIDES:
+            given.add((EVERY_NODE, result[place].partition(":=")[0]))
+            result[place] = _rewrite_override(result[place])
+    return result
+
+
+def _without(block: Mapping[str, Any], given: set[tuple[str, str]], node: str = "") -> Any:
+    """What a file gives nodes, but for the keys that are given again later; adds its own to them.
+
+    ROS keeps values of both types where the later one has another type, and may use the first.
+    """
+    kept: dict[str, Any] = {}
+    for name, value in block.items():
+        if name == "ros__parameters":
+            leaves = {key: item for key, item in _leaves(value) if (node, key) not in given}
+            given.update((node, key) for key in leaves)
+            kept[name] = leaves
+        else:
+            kept[name] = _without(value, given, f"{node}/{name}".replace("//", "/"))
+    return kept
+
+
+def _rewrite_override(text: str) -> str:
+    """`key:=value` with a list that ROS reads as it is meant."""
+    key, separator, written = text.partition(":=")
+    try:
+        value = yaml.safe_load(written)
+    except yaml.YAMLError:
+        return text  # ROS says what is wrong with it.
+    if not isinstance(value, list):
+        return text
+    _check_leaf(key, value, COMMAND_LINE)
+    dumped = yaml.dump(_plain(value), Dumper=_Quoted, default_flow_style=True, width=10**6)
+    return key + separator + dumped.strip()
+
+
+def dump(content: Mapping[str, Any]) -> str:
+    """A parameter file's text that ROS reads as it is meant."""
+    return yaml.dump(_plain(content), Dumper=_Quoted, sort_keys=False)
+
+
+def write(file: Path, values: Mapping[str, Any]) -> Path:
+    """Writes a scenario's values as a file that programs are started with."""
+    file.write_text(dump({EVERY_NODE: {"ros__parameters": dict(values)}}))
+    return file
+
+
+def origin_of_key(arguments: Sequence[str], key: str) -> str | None:
+    """What gives a key on a command line: an override, the last file that holds its block.
+
+    The last file, where none does; None, where there is no file.
+    """
+    for option, text in pairwise(arguments):
+        if option in OVERRIDES and text.partition(":=")[0].rpartition(":")[2] == key:
+            return COMMAND_LINE
+    paths, head = files_of(arguments), key.split(".")[0]
+    for path in reversed(paths):
+        if any(item.split(".")[0] == head for item, _ in _leaves(_checked(path))):
+            return path
+    return paths[-1] if paths else None
+
+
+def _checked(path: str) -> Mapping[str, Any]:
+    content = read_yaml(Path(path))
+    if not isinstance(content, Mapping):
+        found = "nothing" if content is None else repr(content)
+        raise ScenarioError("(file)", found, "node: ros__parameters: ...", path)
+    for node, block in content.items():
+        _check_node(str(node), block, path)
+    for key, value in _leaves(content):
+        _check_leaf(key, value, path)
+    return content
+
+
+def _check_node(name: str, block: Any, path: str) -> None:
+    """Refuses values that stand beside `ros__parameters` instead of in it."""
+    if not isinstance(block, Mapping):
+        raise ScenarioError(name, repr(block), "a block with ros__parameters", path)
+    for key, value in block.items():
+        if key != "ros__parameters":
+            _check_node(f"{name}.{key}", value, path)
+        elif not isinstance(value, Mapping):
+            raise ScenarioError(f"{name}.{key}", repr(value), "a block of parameters", path)
+
+
+def _leaves(block: Mapping[Any, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    """Dotted keys below `ros__parameters`, with their values."""
+    for key, value in block.items():
+        name = f"{path}.{key}" if path else str(key)
+        if isinstance(value, Mapping):
+            yield from _leaves(value, "" if key == "ros__parameters" else name)
+        else:
+            yield name, value
+
+
+def _check_leaf(key: str, value: Any, path: str) -> None:
+    if value is None:
+        raise ScenarioError(key, "nothing", "a value", path)
+    items = value if isinstance(value, list) else [value]
+    kinds = {float if type(item) is int else type(item) for item in items}
+    if not kinds <= {bool, float, str} or len(kinds) > 1:
+        raise ScenarioError(key, repr(value), "numbers, texts, or true and false", path)
+
+
+def _plain(value: Any) -> Any:
+    """The same content with lists of whole and other numbers made one kind."""
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list) and {type(item) for item in value} == {int, float}:
+        return [float(item) for item in value]
+    return value

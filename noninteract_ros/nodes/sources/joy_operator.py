@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Program `joy_operator`: a gamepad or space mouse that leads a subtask by rates."""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import Joy
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.nodes.common.program import run_program
+from noninteract_ros.nodes.sources.operator_node import OperatorNode
+from noninteract_ros.sources.human.input_settings import JoySettings
+from noninteract_ros.sources.human.joy_mapping import JoyMapping
+from noninteract_ros.subtasks.reference import Reference
+
+
+class JoyOperator(OperatorNode):
+    """Leads while the enable button is held, or without one while the device is deflected."""
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("joy_operator", **kwargs)
+        settings = self.scenario.joy or JoySettings()
+        self._mapping = JoyMapping(settings)
+        self._stick: Array = np.zeros(6)
+        self.subscribe(Joy, settings.topic, self._on_joy)
+
+    def _on_joy(self, message: Joy) -> None:
+        stick, held = self._mapping.read(message.axes, message.buttons)
+        self._stick = stick
+        self.dead_man.note(time.monotonic(), held)
+
+    def lead(self, now: float, desired: Reference) -> None:
+        """A rate in proportion to the deflection."""
+        self.say_rate(self.input.rate(self._stick, desired))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return run_program(JoyOperator, arguments)

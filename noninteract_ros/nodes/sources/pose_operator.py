@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Program `pose_operator`: a haptic device or tracker that leads a subtask by its pose."""
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+from sensor_msgs.msg import Joy
+from std_msgs.msg import Bool
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.errors import InputError, ScenarioError
+from noninteract_ros.nodes.common.program import run_program
+from noninteract_ros.nodes.messages.cdr import check_finite
+from noninteract_ros.nodes.messages.messages import POSE, check_rotations, flat
+from noninteract_ros.nodes.sources.operator_node import OperatorNode
+from noninteract_ros.sources.human.input_settings import TrackerSettings
+from noninteract_ros.sources.human.input_shaping import DeadMan
+from noninteract_ros.subtasks import so3
+from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.reference import Reference
+
+
+class PoseOperator(OperatorNode):
+    """Leads while the clutch is held: the subtask moves from where it is as the device does.
+
+    The device's silence lets go, and so does a pose that has jumped. A clutch on a Joy lets go by
+    its silence, too, for drivers repeat what is pressed; a Bool holds until it is told otherwise.
+    """
+
+    def __init__(self, **kwargs: Any) -> None:
+        super().__init__("pose_operator", **kwargs)
+        settings = self.scenario.tracker or TrackerSettings()
+        self._largest_jump = settings.largest_jump
+        self._mounting = _mounting(settings)
+        self._button = settings.clutch_button
+        self._clutch, self._pressed = False, DeadMan(self.settings.hold_timeout)
+        self._pose: Array | None = None
+        self.subscribe(PoseStamped, settings.pose_topic, self._on_pose)
+        if settings.clutch_topic:
+            self.subscribe(Bool, settings.clutch_topic, self._on_clutch)
+        if settings.joy_topic:
+            self.subscribe(Joy, settings.joy_topic, self._on_joy)
+
+    def _on_clutch(self, message: Bool) -> None:
+        self._clutch = message.data
+
+    def _on_joy(self, message: Joy) -> None:
+        there = len(message.buttons) > self._button
+        self._pressed.note(time.monotonic(), there and bool(message.buttons[self._button]))
+
+    def _on_pose(self, message: PoseStamped) -> None:
+        pose = flat(message.pose.position, message.pose.orientation)
+        check_finite(pose, POSE.__getitem__)
+        check_rotations(pose[None, 3:], ("the device",))
+        turned = so3.product(self._mounting, so3.normalized(pose[3:]))
+        pose = np.concatenate(
+            [
+                so3.matrix(self._mounting) @ pose[:3],
+                so3.product(turned, so3.inverse(self._mounting)),
+            ]
+        )
+        before, self._pose = self._pose, pose
+        now = time.monotonic()
+        held = self._clutch or self._pressed.held(now)
+        if before is not None and self.dead_man.held(now):
+            way = float(np.linalg.norm(pose[:3] - before[:3]))
+            if way > self._largest_jump:
+                self.dead_man.lapse()
+                raise InputError(f"the pose jumped by {way:.3g} m: the clutch lets go")
+        self.dead_man.note(now, held)
+
+    def lead(self, now: float, desired: Reference) -> None:
+        """A set-point that is as far from where the clutch was taken as the device is."""
+        assert self._pose is not None  # Without a pose nothing is held.
+        if not self.input.clutched:
+            self.input.engage(self._pose, desired.position)
+        self.say_target(self.input.target(self._pose))
+
+    def let_go(self) -> None:
+        """Lets the clutch go."""
+        self.input.release()
+
+
+def _mounting(settings: TrackerSettings) -> Array:
+    found = list(settings.mounting)
+    try:
+        if len(found) != 4:
+            raise InputError(f"{len(found)} numbers")
+        return Layout((0,), (True,)).checked(np.array(found))
+    except InputError as error:
+        allowed = f"a unit quaternion x, y, z, w ({error})"
+        raise ScenarioError("tracker.mounting", found, allowed) from error
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Entry point."""
+    return run_program(PoseOperator, arguments)

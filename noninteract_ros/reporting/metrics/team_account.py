@@ -1,0 +1,162 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The energy account that the controller told of, for the port where its team is touched."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.energy.account import QUANTITIES
+from noninteract_ros.control.energy.gate import GATED
+from noninteract_ros.errors import RecordingError
+from noninteract_ros.reporting.checks.checks import Check, at_least, at_most, not_applicable
+from noninteract_ros.reporting.metrics.intervals import laws
+from noninteract_ros.reporting.recording.recorded import INTERVENTIONS, Recorded, common_instants
+
+TOPIC = "energy"
+LIMITS = ("limit", "too fast", "singularity", "no finite torque")  # in what a controller says
+# Shares of the largest sum that rounding may add to the residual at a tick.
+ROUNDING = 64.0 * float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True)
+class TeamAccount:
+    """The account over time, shape (n,) each.
+
+    Attributes:
+        t: Time of the run [s].
+        gated: Whether the law in force has gates.
+        storage: T + nu U of the errors [J].
+        supplied: Power at the physical port [W].
+        dissipated: Power that the impedance takes [W].
+        demand: Power that complete decoupling would inject [W].
+        tank: Energy in the tank [J].
+        owed: Energy that must come in before sigma may rise [J].
+        reserve: Energy in the reserve [J].
+        sigma: Gate of the decoupling.
+        grip: Gate of the impedance.
+        residual: What all storage grew by beyond all that came in [J].
+        received: Work of the surroundings since the account began [J].
+        measured: Integral of `supplied` since then [J].
+        brought: Energy that moved references brought since then [J].
+        credit: Energy granted for them since then [J].
+        refilled: Energy granted by an operator since then [J].
+        lost: Energy withheld or spilt since then [J].
+        account: Number of the account; sums begin anew with it.
+    """
+
+    t: Array
+    gated: NDArray[np.bool_]
+    storage: Array
+    supplied: Array
+    dissipated: Array
+    demand: Array
+    tank: Array
+    owed: Array
+    reserve: Array
+    sigma: Array
+    grip: Array
+    residual: Array
+    received: Array
+    measured: Array
+    brought: Array
+    credit: Array
+    refilled: Array
+    lost: Array
+    account: Array
+
+
+def team_account(recorded: Recorded) -> TeamAccount:
+    """The account as it was told.
+
+    Raises:
+        RecordingError: The topic is missing, of another type, empty or without one of its labels.
+    """
+    series = recorded.run.labelled(recorded.team_topic(TOPIC))
+    missing = [label for label in QUANTITIES if label not in series.labels]
+    if missing or not len(series.stamps):
+        raise RecordingError(f"{recorded.run.path}: {TOPIC} lacks {', '.join(missing) or 'data'}")
+    columns = {label: series[label] for label in QUANTITIES}
+    t = recorded.since_start(series.stamps)
+    return TeamAccount(t, laws(recorded, t) == GATED, **columns)
+
+
+def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
+    """Gates, levels and residual of the account."""
+    names = ("account.residual", "account.sigma", "account.grip")
+    try:
+        found = team_account(recorded)
+    except RecordingError as error:
+        reason = str(error)
+        return {"reason": reason}, [not_applicable(name, 0.0, "", reason) for name in names]
+    steps, gated = np.diff(found.t, append=found.t[-1]), found.gated
+    metrics: dict[str, Any] = {
+        "gated_s": float(steps[gated].sum()),
+        "sigma_min": float(found.sigma[gated].min()) if gated.any() else None,
+        "sigma_below_1_s": float(steps[gated & (found.sigma < 1.0)].sum()),
+        "grip_min": float(found.grip[gated].min()) if gated.any() else None,
+        "grip_below_1_s": float(steps[gated & (found.grip < 1.0)].sum()),
+        "residual_max_J": float(found.residual.max()),
+        "tank_min_J": float(found.tank.min()),
+        "tank_max_J": float(found.tank.max()),
+        "reserve_min_J": float(found.reserve.min()),
+        "storage_max_J": float(found.storage.max()),
+        "received_J": float(found.received[-1]),
+        "lost_J": float(found.lost[-1]),
+        "credit_J": float(found.credit[-1]),
+        "refilled_J": float(found.refilled[-1]),
+        "accounts": len(np.unique(found.account)),
+    }
+    checks = [at_most(names[0], metrics["residual_max_J"], _rounding(recorded, found), "J")]
+    reason = _may_close(recorded, found)
+    for name, lowest in zip(names[1:], ("sigma_min", "grip_min"), strict=True):
+        checks.append(
+            not_applicable(name, 1.0, "", reason)
+            if reason
+            else at_least(name, metrics[lowest], 1.0, "")
+        )
+    return metrics, checks
+
+
+def _rounding(recorded: Recorded, found: TeamAccount) -> float:
+    """Largest residual that rounding of all sums can make [J]."""
+    sums = (found.storage, found.tank, found.reserve, found.received, found.brought, found.lost)
+    scale = sum(float(np.abs(item).max()) for item in sums)
+    return ROUNDING * len(recorded.t) * scale
+
+
+def _may_close(recorded: Recorded, found: TeamAccount) -> str:
+    """Why a gate may close in this run, or an empty text."""
+    scenario = recorded.scenario
+    if not found.gated.any():
+        return f"law {scenario.general.law} has no gates"
+    if not recorded.lockstep:
+        return "wall time: torques act late, which costs energy"
+    if touched := [*scenario.surroundings, *scenario.pushes]:
+        return f"what the team touches may close a gate: {', '.join(touched)}"
+    if any(recorded.has(f"{robot}/push") for robot in scenario.robots):
+        return "somebody pushed the team, which may close a gate"
+    if limits_acted(recorded, found):
+        return "singularities or limits of joints acted, which may close a gate"
+    return ""
+
+
+def limits_acted(recorded: Recorded, found: TeamAccount) -> bool:
+    """Whether anything but a gate changed the law's torque.
+
+    As far as the controller's diagnostics say so, and as open gates let one see it.
+    """
+    statuses = recorded.run.diagnostics() if recorded.has("diagnostics") else []
+    for status in statuses:
+        told = status["name"].endswith("controller") and status["message"]
+        if told and any(word in told for word in LIMITS):
+            return True
+    series = recorded.run.labelled(f"{recorded.stack.names[0]}/energy")
+    if INTERVENTIONS not in series.labels:
+        return False
+    rows, others = common_instants(recorded.since_start(series.stamps), found.t)
+    opened = (found.sigma[others] == 1.0) & (found.grip[others] == 1.0)
+    more = np.diff(series[INTERVENTIONS][rows]) > 0.0
+    return bool((more & opened[1:] & opened[:-1]).any())

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The blocks of a scenario file, each checked by itself."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+from noninteract_ros.control.law.decoupling import LAWS
+from noninteract_ros.control.law.impedance import ImpedanceSettings
+from noninteract_ros.control.references.subtask_input import InputSettings
+from noninteract_ros.errors import ScenarioError, one_of
+from noninteract_ros.schema import Key, convert, join, key, keys_of, load
+from noninteract_ros.simulation.environment import SURROUNDINGS, SurroundingBlock
+from noninteract_ros.sources.autonomy.planner import Formation, PlannerSettings
+from noninteract_ros.subtasks.kinds.registry import SubtaskBlock, kind_named
+from noninteract_ros.team.models.registry import ROBOT_MODELS, RobotBlock
+from noninteract_ros.team.models.urdf_robot import TOPIC
+from noninteract_ros.team.state_assembler import PREDICTIONS
+
+DEVICES = ("operator", "joy", "tracker", "keyboard")
+OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console", "tank", *DEVICES)
+LISTINGS = ("robots", "subtasks", "pushes", "surroundings")
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # What may be a part of a topic's name.
+# Every ROS node has these of its own.
+ROS_KEYS = ("use_sim_time", "start_type_description_service", "qos_overrides")
+
+
+@dataclass(frozen=True)
+class General:
+    """The keys of a scenario that belong to no block."""
+
+    robots: tuple[str, ...] = key("Names of the robots; each has a block of that name")
+    subtasks: tuple[str, ...] = key("Names of the subtasks; each has a block of that name")
+    rate: float = key("Ticks per second [Hz]", 1000.0, positive=True, maximum=10000.0)
+    duration: float = key("How long a demo runs [s]", 20.0, positive=True)
+    lockstep: bool = key("Step only when the command that answers a state has come", True)
+    real_time: bool = key("In lockstep: never run ahead of wall time", False)
+    law: str = key("Control law", "energy_gated", choices=LAWS, live=True)
+    gravity: tuple[float, ...] = key("Gravity in the world [m/s^2]", (0.0, 0.0, -9.81))
+    telemetry_rate: float = key(
+        "Rate of subtask states, energies and external wrenches [Hz]", 250.0, positive=True
+    )
+    lockstep_sources: tuple[str, ...] = key(
+        "Sources that the controller waits for in lockstep, as <subtask>/<source>", ()
+    )
+    lockstep_timeout: float = key(
+        "Wall time after which a lockstep source counts as absent [s]", 5.0, positive=True
+    )
+    force_sensors: tuple[str, ...] = key(
+        "Robots whose external_wrench the controller's energy account uses", ()
+    )
+    state_timeout: float = key(
+        "Gap between states after which the controller starts anew [s]", 0.2, positive=True
+    )
+    max_state_skew: float = key(
+        "Age up to which a robot's state is carried on to that of the newest, where robots have"
+        " topics of their own; beyond it the team is held still [s]",
+        0.02,
+        positive=True,
+    )
+    state_prediction: str = key(
+        "What is taken as constant meanwhile; acceleration is measured, and noise with it",
+        "velocity",
+        choices=PREDICTIONS,
+    )
+    command_timeout: float = key(
+        "Age of a command after which the team brakes, in wall time [s]", 0.1, positive=True
+    )
+    push_timeout: float = key("How long a push lasts unless repeated [s]", 0.1, positive=True)
+    transition_time: float = key("Fade of a change of law or gains [s]", 0.2, positive=True)
+    stop_rate: float = key(
+        "Decay rate of the velocity after a stop, in full force 4 / stop_rate after it; of slow"
+        " motions up to twice as much; at most an eighth of the rate [1/s]",
+        30.0,
+        positive=True,
+    )
+    pushes: tuple[str, ...] = key("Names of pushes; each has a block of that name", ())
+    surroundings: tuple[str, ...] = key(
+        "Names of objects, doors and walls; each has a block of that name", ()
+    )
+    publish_clock: bool = key("Whether robot_team publishes /clock", False)
+    end_time: float = key(
+        "Time at which robot_team stops for good, as a demo does [s]; 0: never", 0.0, minimum=0.0
+    )
+    start_paused: bool = key("Whether robot_team waits for ~/pause before its first tick", False)
+
+
+@dataclass(frozen=True)
+class SubtaskSpec:
+    """One subtask: what it is, how it behaves, who leads it."""
+
+    kind: SubtaskBlock
+    impedance: ImpedanceSettings
+    input: InputSettings
+
+
+def named_blocks(values: Mapping[str, Any]) -> list[str]:
+    """Names of all blocks that are listed, with what they clash with refused."""
+    names: list[str] = []
+    reserved = {item.name for item in fields(General)} | set(OPTIONAL)
+    for listing in LISTINGS:
+        for name in _listed(listing, values.get(listing, ())):
+            if not NAME.fullmatch(name) or name in reserved:
+                allowed = "names of letters, digits and _ that are no keys of a scenario"
+                raise ScenarioError(listing, repr(name), allowed)
+            if name in names:
+                raise ScenarioError(listing, repr(name), "names that are used once")
+            names.append(name)
+    return names
+
+
+def _listed(listing: str, names: Any) -> tuple[str, ...]:
+    return tuple(convert(listing, names, tuple[str, ...], Key("Names")))
+
+
+def block_of(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
+    """The block of a name, which has to be there."""
+    block = values.get(name)
+    if not isinstance(block, Mapping):
+        found = "nothing" if block is None else repr(block)
+        raise ScenarioError(name, found, "a block of keys (required)")
+    return block
+
+
+def load_optional(block: type, values: Mapping[str, Any], name: str) -> Any:
+    """A block that may be left out; then None."""
+    return load(block, block_of(values, name), name) if name in values else None
+
+
+def load_robot(name: str, values: Mapping[str, Any]) -> RobotBlock:
+    """The block of a robot, of the model that it names."""
+    model = values.get("model", "point_mass")
+    if not isinstance(model, str) or model not in ROBOT_MODELS:
+        raise ScenarioError(f"{name}.model", repr(model), one_of(ROBOT_MODELS, str(model)))
+    return load(ROBOT_MODELS[model], values, name)
+
+
+def description_topics(values: Mapping[str, Any]) -> dict[str, str]:
+    """Topics of the robots whose descriptions have not come yet, by robot."""
+    blocks = {name: values.get(name) for name in values.get("robots", ())}
+    return {
+        name: block["urdf"].removeprefix(TOPIC)
+        for name, block in blocks.items()
+        if isinstance(block, Mapping)
+        and str(block.get("urdf", "")).startswith(TOPIC)
+        and not block.get("urdf_text")
+    }
+
+
+def load_surrounding(name: str, values: Mapping[str, Any]) -> SurroundingBlock:
+    """The block of an object, a door or a wall."""
+    kind = values.get("kind")
+    if not isinstance(kind, str) or kind not in SURROUNDINGS:
+        found = "nothing" if kind is None else repr(kind)
+        raise ScenarioError(f"{name}.kind", found, one_of(SURROUNDINGS, str(kind)))
+    return load(SURROUNDINGS[kind], values, name)
+
+
+def load_subtask(name: str, values: Mapping[str, Any]) -> SubtaskSpec:
+    """The blocks of a subtask: its kind, its impedance and its input."""
+    kind = kind_named(f"{name}.kind", values.get("kind"))
+    blocks = (kind, ImpedanceSettings, InputSettings)
+    known = tuple(item.name for block in blocks for item in keys_of(block))
+    for item in values:
+        if item not in known:
+            raise ScenarioError(join(name, item), "an unknown key", one_of(known, item))
+    return SubtaskSpec(
+        load(kind, values, name, ignore=known),
+        load(ImpedanceSettings, values, name, ignore=known),
+        load(InputSettings, values, name, ignore=known),
+    )
+
+
+def load_planner(
+    scenario: Mapping[str, Any],
+) -> tuple[PlannerSettings | None, dict[str, Formation]]:
+    """The block of the planner, if there is one, and those of its formations."""
+    if "planner" not in scenario:
+        return None, {}
+    values = block_of(scenario, "planner")
+    names = _listed("planner.formations", values.get("formations", ()))
+    settings = load(PlannerSettings, values, "planner", ignore=names)
+    formations = {}
+    for name in settings.formations:
+        path = f"planner.{name}"
+        block = values.get(name)
+        if not isinstance(block, Mapping):
+            raise ScenarioError(path, "nothing", "a formation (required)")
+        formations[name] = load(Formation, block, path)
+    return settings, formations

@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Scenario files: where they are, and their content as nested values."""
+
+import os
+import sys
+import sysconfig
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from noninteract_ros.errors import ScenarioError, one_of
+from noninteract_ros.scenario.scenario import Scenario
+
+PACKAGE = "noninteract_ros"
+
+
+def load_scenario(path: Path) -> Scenario:
+    """The checked scenario of a file.
+
+    Raises:
+        ScenarioError: The file is wrong; the error names the file and the key.
+    """
+    try:
+        return Scenario.from_dict(read_parameters(path))
+    except ScenarioError as error:
+        if error.file:
+            raise
+        raise ScenarioError(error.key, error.found, error.allowed, str(path)) from error
+
+
+def read_parameters(path: Path) -> dict[str, Any]:
+    """Nested parameters of a scenario file, those of all its nodes merged.
+
+    Raises:
+        ScenarioError: The file is missing or is no parameter file.
+    """
+    content = read_yaml(path)
+    blocks = content.values() if isinstance(content, Mapping) else ()
+    parameters: dict[str, Any] = {}
+    for block in blocks:
+        if not isinstance(block, Mapping) or "ros__parameters" not in block:
+            raise ScenarioError("(file)", "no ros__parameters", "/**: ros__parameters:", str(path))
+        parameters.update(block["ros__parameters"])
+    return nest(parameters)
+
+
+def read_yaml(path: Path) -> Any:
+    """Content of a YAML file.
+
+    Raises:
+        ScenarioError: The file cannot be read or is no YAML.
+    """
+    try:
+        return yaml.safe_load(path.read_text())
+    except OSError as error:
+        raise ScenarioError("(file)", error.strerror, "a readable file", str(path)) from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        found = " ".join(str(error).split())
+        raise ScenarioError("(file)", found, "a YAML file", str(path)) from error
+
+
+def nest(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Nested blocks of dotted keys."""
+    nested: dict[str, Any] = {}
+    for name, value in values.items():
+        block, *rest = name.split(".")
+        if isinstance(value, Mapping):
+            value = nest(value)
+        for part in reversed(rest):
+            value = {part: value}
+        if isinstance(value, Mapping) and isinstance(nested.get(block), dict):
+            nested[block] = _merge(nested[block], value)
+        else:
+            nested[block] = value
+    return nested
+
+
+def _merge(old: dict[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    merged = dict(old)
+    for key, value in new.items():
+        both = isinstance(value, Mapping) and isinstance(merged.get(key), dict)
+        merged[key] = _merge(merged[key], value) if both else value
+    return merged
+
+
+def for_console(values: Mapping[str, Any], port: int) -> dict[str, Any]:
+    """A scenario whose human is a person at the console.
+
+    It runs in lockstep that keeps to wall time: on a machine that is too slow for its rate it runs
+    slower, and as exactly. Nobody waits for the person, and nobody else speaks for them.
+    """
+    changed = {name: item for name, item in values.items() if name != "haptic"}
+    sources = values.get("lockstep_sources", ())
+    changed |= {
+        "lockstep": True,
+        "real_time": True,
+        "lockstep_sources": [name for name in sources if not name.endswith("/human")],
+        "console": {**values.get("console", {}), "port": port},
+    }
+    for name in values["subtasks"]:
+        changed[name] = {**values[name], "takeover": "shaped"}
+    return changed
+
+
+def config_folders() -> list[Path]:
+    """Folders that hold the package's scenarios: a source tree, an installation, a ROS prefix."""
+    prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(":")), sys.prefix]
+    shares = [Path(prefix, "share") for prefix in prefixes] + [
+        Path(sysconfig.get_path("data"), "share")
+    ]
+    source = Path(__file__).parents[2] / "config"
+    return [source, *(share / PACKAGE / "config" for share in shares)]
+
+
+def known_scenarios() -> dict[str, Path]:
+    """Files of all scenarios that can be called by a name."""
+    known: dict[str, Path] = {}
+    for folder in reversed(config_folders()):
+        known.update({file.stem: file for file in sorted(folder.glob("*.yaml"))})
+    return known
+
+
+def find_scenario(name: str) -> Path:
+    """The file of a scenario given by its path or by its name.
+
+    Raises:
+        ScenarioError: There is none; the error lists the names there are.
+    """
+    if Path(name).is_file():
+        return Path(name)
+    known = known_scenarios()
+    if name not in known:
+        raise ScenarioError("scenario", repr(name), f"a file, or {one_of(sorted(known), name)}")
+    return known[name]

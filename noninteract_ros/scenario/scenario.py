@@ -1,0 +1,257 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A scenario: the one file that every program of a run is started with."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from noninteract_ros.control.controller import TeamController
+from noninteract_ros.control.energy.tank import TankSettings
+from noninteract_ros.control.references.inputs import SOURCES
+from noninteract_ros.control.safety.settings import SafetySettings
+from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_of
+from noninteract_ros.scenario.blocks import (
+    OPTIONAL,
+    ROS_KEYS,
+    General,
+    SubtaskSpec,
+    block_of,
+    load_optional,
+    load_planner,
+    load_robot,
+    load_subtask,
+    load_surrounding,
+    named_blocks,
+)
+from noninteract_ros.scenario.console_settings import ConsoleSettings
+from noninteract_ros.schema import Key, describe, join, load
+from noninteract_ros.simulation.environment import SurroundingBlock
+from noninteract_ros.simulation.plant import Plant
+from noninteract_ros.simulation.push import ScheduledPush
+from noninteract_ros.simulation.subtask_object import ObjectSettings, SubtaskObject
+from noninteract_ros.simulation.team_simulation import TeamSimulation
+from noninteract_ros.sources.autonomy.planner import Formation, FormationPlanner, PlannerSettings
+from noninteract_ros.sources.human.haptic_device import HapticDevice, HapticSettings
+from noninteract_ros.sources.human.input_settings import (
+    JoySettings,
+    KeyboardSettings,
+    OperatorSettings,
+    TrackerSettings,
+)
+from noninteract_ros.sources.link.bilateral import BilateralLink
+from noninteract_ros.sources.link.settings import LinkSettings
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.subtasks.subtask import Subtask
+from noninteract_ros.team.models.registry import RobotBlock
+from noninteract_ros.team.team import Team
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A checked scenario; `build_*` makes the parts of a run.
+
+    Attributes:
+        general: Keys of no block.
+        robots: Blocks of the robots, by name.
+        subtasks: Subtasks, by name.
+        held: Object that the team holds, or None.
+        haptic: The operator's emulated hand and device, or None.
+        link: The connection between device and team, or None.
+        planner: The relative planner, or None.
+        formations: The planner's formations, by name.
+        pushes: Scheduled pushes, by name.
+        surroundings: Objects, doors and walls, by name.
+        safety: Behaviour at singularities and joint limits.
+        console: The operator's console, or None.
+        tank: The energy account.
+        operator: What people's devices have in common, or None.
+        joy: Meaning of a gamepad's or space mouse's axes and buttons, or None.
+        tracker: A device that tells its pose, or None.
+        keyboard: Keys of a terminal, or None.
+    """
+
+    general: General
+    robots: Mapping[str, RobotBlock]
+    subtasks: Mapping[str, SubtaskSpec]
+    held: ObjectSettings | None
+    haptic: HapticSettings | None
+    link: LinkSettings | None
+    planner: PlannerSettings | None
+    formations: Mapping[str, Formation]
+    pushes: Mapping[str, ScheduledPush]
+    surroundings: Mapping[str, SurroundingBlock]
+    safety: SafetySettings
+    console: ConsoleSettings | None
+    tank: TankSettings
+    operator: OperatorSettings | None
+    joy: JoySettings | None
+    tracker: TrackerSettings | None
+    keyboard: KeyboardSettings | None
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> "Scenario":
+        """Checks nested values, as in a parameter file, and everything they must fit together.
+
+        Raises:
+            ScenarioError: A key is wrong; the error names it, what was found and what is allowed.
+        """
+        values = {name: value for name, value in values.items() if name not in ROS_KEYS}
+        named = named_blocks(values)
+        general = load(General, values, ignore=(*named, *OPTIONAL))
+        planner, formations = load_planner(values)
+        scenario = cls(
+            general,
+            {name: load_robot(name, block_of(values, name)) for name in general.robots},
+            {name: load_subtask(name, block_of(values, name)) for name in general.subtasks},
+            load_optional(ObjectSettings, values, "object"),
+            load_optional(HapticSettings, values, "haptic"),
+            load_optional(LinkSettings, values, "link"),
+            planner,
+            formations,
+            {name: load(ScheduledPush, block_of(values, name), name) for name in general.pushes},
+            {
+                name: load_surrounding(name, block_of(values, name))
+                for name in general.surroundings
+            },
+            load_optional(SafetySettings, values, "safety") or SafetySettings(),
+            load_optional(ConsoleSettings, values, "console"),
+            load_optional(TankSettings, values, "tank") or TankSettings(),
+            load_optional(OperatorSettings, values, "operator"),
+            load_optional(JoySettings, values, "joy"),
+            load_optional(TrackerSettings, values, "tracker"),
+            load_optional(KeyboardSettings, values, "keyboard"),
+        )
+        scenario.check()
+        return scenario
+
+    def parameters(self) -> Iterator[tuple[str, Any, Key, Any]]:
+        """Dotted key, type, rule and value of every key of every block."""
+        blocks: list[tuple[str, object | None]] = [("", self.general)]
+        blocks += [*self.robots.items(), *self.pushes.items(), *self.surroundings.items()]
+        blocks += [("object", self.held), ("haptic", self.haptic), ("link", self.link)]
+        blocks.append(("tank", self.tank))
+        blocks += [("planner", self.planner), ("safety", self.safety), ("console", self.console)]
+        blocks += [("operator", self.operator), ("joy", self.joy), ("tracker", self.tracker)]
+        blocks += [("keyboard", self.keyboard)]
+        blocks += [(f"planner.{name}", block) for name, block in self.formations.items()]
+        for name, spec in self.subtasks.items():
+            blocks += [(name, part) for part in (spec.kind, spec.impedance, spec.input)]
+        for name, block in blocks:
+            if block is not None:
+                yield from describe(block, name)
+
+    def check(self) -> None:
+        """Builds every part once, so that nothing is found wrong later.
+
+        Raises:
+            ScenarioError: Parts do not fit together.
+        """
+        self.safety.check()
+        if self.console:
+            self.console.check()
+        self.tank.check()
+        if len(self.general.gravity) != 3:
+            raise ScenarioError("gravity", list(self.general.gravity), "3 numbers")
+        sources = [join_source(name, source) for name in self.subtasks for source in SOURCES]
+        for source in self.general.lockstep_sources:
+            if source not in sources:
+                raise ScenarioError("lockstep_sources", repr(source), one_of(sources, source))
+        for robot in self.general.force_sensors:
+            if robot not in self.robots:
+                raise ScenarioError("force_sensors", repr(robot), one_of(self.robots, robot))
+        self._check_topics()
+        team = self.build_team()
+        stack = self.build_stack(team)
+        self.build_controller(team, stack)
+        for push_name, push in self.pushes.items():
+            push.check(push_name, team)
+        self.build_simulation(team, stack)
+        if self.haptic or self.link:
+            self.build_haptic(stack)
+        if self.planner:
+            self.build_planner(stack)
+
+    @property
+    def own_states(self) -> bool:
+        """Whether each robot tells its state on a topic of its own."""
+        return any(block.wiring.joint_states_topic for block in self.robots.values())
+
+    def _check_topics(self) -> None:
+        for name, block in self.robots.items():
+            if self.own_states and not block.wiring.joint_states_topic:
+                path, found = join(name, "joint_states_topic"), "nothing"
+                raise ScenarioError(path, found, "a topic for every robot, or for none")
+
+    def build_team(self) -> Team:
+        """The robots as one model."""
+        robots = [block.build(name) for name, block in self.robots.items()]
+        try:
+            return Team(robots, self.general.gravity)
+        except TeamError as error:
+            raise ScenarioError("robots", list(self.robots), str(error)) from error
+
+    def build_stack(self, team: Team) -> SubtaskStack:
+        """The subtasks stacked, with the assumptions of the law checked."""
+        subtasks: dict[str, Subtask] = {}
+        for name, spec in self.subtasks.items():
+            subtasks[name] = spec.kind.build(name, team, subtasks)
+        try:
+            return SubtaskStack(team, list(subtasks.values()))
+        except SubtaskError as error:
+            raise ScenarioError("subtasks", list(self.subtasks), str(error)) from error
+
+    def build_controller(self, team: Team, stack: SubtaskStack) -> TeamController:
+        """The controller, without ROS."""
+        return TeamController(
+            team,
+            stack,
+            self.general.law,
+            [spec.impedance for spec in self.subtasks.values()],
+            [spec.input for spec in self.subtasks.values()],
+            self.general.transition_time,
+            min(self.general.stop_rate, 0.125 * self.general.rate),
+            self.general.state_timeout,
+            self.safety,
+            self.tank,
+            measured=bool(self.general.force_sensors),
+        )
+
+    def build_simulation(self, team: Team, stack: SubtaskStack) -> TeamSimulation:
+        """The simulated team with its object and pushes."""
+        held = SubtaskObject(self.held, stack) if self.held else None
+        parts = [item.build(name, team) for name, item in self.surroundings.items()]
+        bodies = [body for bodies, _ in parts for body in bodies]
+        if held and bodies:
+            raise ScenarioError("object", "a block", "nothing, where surroundings have bodies")
+        plant = Plant(team, bodies, [coupling for _, couplings in parts for coupling in couplings])
+        return TeamSimulation(plant, self.general.rate, held, list(self.pushes.values()))
+
+    def build_haptic(self, stack: SubtaskStack) -> HapticDevice | BilateralLink:
+        """The operator's emulated hand and device, behind its link if there is one."""
+        settings = self._required(self.haptic, "haptic")
+        layout = self._commanded(stack, settings.subtask, "haptic").layout
+        device = HapticDevice(settings, layout)
+        return BilateralLink(device, settings, self.link, layout) if self.link else device
+
+    def build_planner(self, stack: SubtaskStack) -> FormationPlanner:
+        """The relative planner."""
+        settings = self._required(self.planner, "planner")
+        task = self._commanded(stack, settings.subtask, "planner")
+        return FormationPlanner(settings, self.formations, task.layout)
+
+    @staticmethod
+    def _required(block: Any, name: str) -> Any:
+        if block is None:
+            raise ScenarioError(name, "nothing", "a block of that name (required)")
+        return block
+
+    @staticmethod
+    def _commanded(stack: SubtaskStack, subtask: str, block: str) -> Subtask:
+        if subtask not in stack.names:
+            raise ScenarioError(f"{block}.subtask", repr(subtask), one_of(stack.names, subtask))
+        return stack.subtasks[stack.names.index(subtask)]
+
+
+def join_source(subtask: str, source: str) -> str:
+    """Name of a source of a subtask, as topics and `lockstep_sources` spell it."""
+    return f"{subtask}/{source}"

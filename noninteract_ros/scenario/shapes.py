@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What robots and surroundings look like: convex bodies, each fixed to a joint.
+
+Arms from URDF look as their collision geometry does. Where that is missing, and for arms that are
+made from lengths and masses, a link is a stick from its joint to the next. Point masses are balls.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from scipy.spatial import QhullError
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.errors import ScenarioError
+from noninteract_ros.scenario.scenario import Scenario
+from noninteract_ros.simulation.environment import Door, RigidObject
+from noninteract_ros.simulation.plant import Plant
+from noninteract_ros.team.geometry import hulls
+from noninteract_ros.team.geometry.hulls import Hull
+from noninteract_ros.team.models.point_mass import PointMass
+from noninteract_ros.team.models.urdf_files import read_urdf, share_folders
+from noninteract_ros.team.models.urdf_robot import UrdfRobot
+from noninteract_ros.team.robot import Robot
+
+NOBODY = -1
+STICK = 0.07  # radius of a link without geometry, as a share of the longest link
+PANEL = (0.02, 0.05)  # thickness and height of a door, as shares of its width
+FEW = 6  # balls that are drawn as round as can be
+FINE = 0.08  # longest edge of a triangle, as a share of the radius of all that is seen
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A convex body fixed to a joint.
+
+    Attributes:
+        joint: Number of the joint in the plant's model; 0 is the world.
+        hull: The body in the joint's frame.
+        owner: Number of the robot that it belongs to, or `NOBODY`.
+    """
+
+    joint: int
+    hull: Hull
+    owner: int
+
+
+def shapes_of(
+    scenario: Scenario, plant: Plant, radius: float, longest: float | None = None
+) -> list[Shape]:
+    """Shapes of all robots and of the bodies around them.
+
+    Args:
+        scenario: The scenario.
+        plant: Its team and bodies.
+        radius: Of all that is seen [m]; point masses are small against it.
+        longest: Longest edge of a triangle [m]; by default small against the radius.
+    """
+    found: list[Shape] = []
+    for number, (robot, block) in enumerate(
+        zip(plant.team.robots, scenario.robots.values(), strict=True)
+    ):
+        parts = _ball(block, scenario, radius) if isinstance(block, PointMass) else []
+        if isinstance(block, UrdfRobot):
+            parts = list(_collision_geometry(block, robot))
+        for joint, hull in parts or _sticks(robot):
+            found.append(Shape(*_in_plant(plant, robot, joint, hull), number))
+    found += [
+        Shape(joint, hull, NOBODY)
+        for name, block in scenario.surroundings.items()
+        for joint, hull in _body(name, block, plant)
+    ]
+    edge = FINE * radius if longest is None else longest
+    return [Shape(shape.joint, shape.hull.refined(edge), shape.owner) for shape in found]
+
+
+def _in_plant(plant: Plant, robot: Robot, joint: int, hull: Hull) -> tuple[int, Hull]:
+    """A shape on a joint of a robot's own model, as one on a joint of the plant's."""
+    if joint == 0:
+        return 0, hull.moved(robot.base_pose)
+    return plant.model.getJointId(f"{robot.name}/{robot.model.names[joint]}"), hull
+
+
+def _ball(block: PointMass, scenario: Scenario, radius: float) -> list[tuple[int, Hull]]:
+    """The heaviest is drawn largest."""
+    masses = [item.mass for item in scenario.robots.values() if isinstance(item, PointMass)]
+    share = 0.08 / np.sqrt(1.0 + 0.25 * len(masses))
+    size = share * radius * (block.mass / max(masses)) ** (1.0 / 3.0)
+    return [(len(block.axes), hulls.ball(size, 60 if len(masses) <= FEW else 24))]
+
+
+def _collision_geometry(block: UrdfRobot, robot: Robot) -> Iterator[tuple[int, Hull]]:
+    """Collision geometry on the joints of a robot's own model; none if meshes are missing."""
+    try:
+        text = read_urdf("urdf", block.urdf) if block.urdf else block.urdf_text
+        full = pin.buildModelFromXML(text)
+        folders = [str(folder) for folder in share_folders()]
+        geometry = pin.buildGeomFromUrdfString(full, text, pin.COLLISION, package_dirs=folders)
+    except (ScenarioError, ValueError):
+        return
+    for item in geometry.geometryObjects:
+        link = full.frames[item.parentFrame]
+        frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]
+        try:
+            hull = hulls.hull_of_geometry(item.geometry)
+        except QhullError:  # A flat mesh.
+            continue
+        if hull is not None:
+            place = frame.placement * link.placement.inverse() * item.placement
+            yield frame.parentJoint, hull.moved(place)
+
+
+def _sticks(robot: Robot) -> list[tuple[int, Hull]]:
+    """Links as sticks from each joint to those that follow, and to the tool."""
+    model = robot.model
+    tool = model.frames[model.getFrameId(robot.tool_frame)]
+    ends: list[tuple[int, Array]] = [
+        (int(model.parents[joint]), model.jointPlacements[joint].translation)
+        for joint in range(1, model.njoints)
+    ]
+    ends.append((int(tool.parentJoint), tool.placement.translation))
+    longest = max(float(np.linalg.norm(end)) for _, end in ends)
+    radius = STICK * (longest or 1.0)
+    return [(0, hulls.cylinder(2.0 * radius, 2.0 * radius))] + [
+        (parent, hulls.stick(np.zeros(3), end, radius))
+        for parent, end in ends
+        if np.linalg.norm(end) > 0.01 * longest
+    ]
+
+
+def _body(name: str, block: object, plant: Plant) -> list[tuple[int, Hull]]:
+    """A rigid object as a box; a door as a panel from its hinge to beyond its handles."""
+    if isinstance(block, RigidObject):
+        return [(plant.model.getJointId(f"{name}/pose"), hulls.box(np.array(block.size)))]
+    if not isinstance(block, Door):
+        return []
+    handles = [
+        frame.placement.translation
+        for frame in plant.model.frames
+        if frame.name.startswith(f"{name}/handle_")
+    ]
+    axis = np.array(block.axis) / np.linalg.norm(block.axis)
+    along = max((end - (end @ axis) * axis for end in handles), key=np.linalg.norm)
+    width = float(np.linalg.norm(along)) or 1.0
+    across = along / width
+    thickness, height = (share * width for share in PANEL)
+    place = pin.SE3(np.column_stack((across, np.cross(axis, across), axis)), 0.55 * width * across)
+    panel = hulls.box(np.array([1.1 * width, thickness, height]))
+    return [(plant.model.getJointId(f"{name}/hinge"), panel.moved(place))]

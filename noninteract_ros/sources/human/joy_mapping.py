@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the axes and buttons of a Joy message mean."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.errors import InputError, ScenarioError
+from noninteract_ros.schema import join
+from noninteract_ros.sources.human.input_settings import JoySettings
+from noninteract_ros.sources.human.input_shaping import deflection
+
+DIRECTIONS = ("x", "y", "z", "roll", "pitch", "yaw")
+TERM = re.compile(r"\s*([+-]?)\s*(axis|button)\s*(\d+)\s*")
+Terms = list[tuple[float, str, int]]
+
+
+class JoyMapping:
+    """Deflections in six directions, and whether the device is held.
+
+    Drivers may leave out buttons that are not pressed (that of space mice does); axes that are
+    missing mean that the mapping belongs to another device.
+
+    Args:
+        settings: The block `joy`.
+        path: Its dotted key, for error messages.
+
+    Raises:
+        ScenarioError: A direction is no sum of axes and buttons.
+    """
+
+    def __init__(self, settings: JoySettings, path: str = "joy") -> None:
+        self._settings = settings
+        self._terms = [_terms(join(path, name), getattr(settings, name)) for name in DIRECTIONS]
+        self._axes = max(
+            (number + 1 for terms in self._terms for _, kind, number in terms if kind == "axis"),
+            default=0,
+        )
+
+    def read(self, axes: Sequence[float], buttons: Sequence[int]) -> tuple[Array, bool]:
+        """Deflections along x, y, z and about them, shape (6,), and whether it is held.
+
+        Without an enable button it is held while it is deflected.
+
+        Raises:
+            InputError: Too few axes, or one that is no number.
+        """
+        if len(axes) < self._axes:
+            raise InputError(f"{len(axes)} axes, the mapping needs {self._axes}")
+        values = np.array(axes, dtype=float)
+        if not np.isfinite(values).all():
+            raise InputError(f"axis {int(np.argmin(np.isfinite(values)))} is not finite")
+        settings = self._settings
+        shaped = deflection(values, settings.deadzone, settings.exponent)
+        stick = np.array([self._sum(terms, shaped, buttons) for terms in self._terms])
+        stick = np.clip(stick, -1.0, 1.0)
+        if _pressed(buttons, settings.slow_button):
+            stick *= settings.slow_factor
+        if settings.enable_button < 0:
+            return stick, bool(stick.any())
+        return stick, _pressed(buttons, settings.enable_button)
+
+    @staticmethod
+    def _sum(terms: Terms, axes: Array, buttons: Sequence[int]) -> float:
+        return sum(
+            sign * (axes[number] if kind == "axis" else float(_pressed(buttons, number)))
+            for sign, kind, number in terms
+        )
+
+
+def _pressed(buttons: Sequence[int], number: int) -> bool:
+    return 0 <= number < len(buttons) and bool(buttons[number])
+
+
+def _terms(path: str, text: str) -> Terms:
+    """The signed axes and buttons of a direction."""
+    terms: Terms = []
+    at = 0
+    while at < len(text):
+        found = TERM.match(text, at)
+        if found is None or (at > 0 and not found[1]):
+            raise ScenarioError(path, repr(text), "a sum such as axis1, -axis0, button5-button4")
+        terms.append((-1.0 if found[1] == "-" else 1.0, found[2], int(found[3])))
+        at = found.end()
+    return terms

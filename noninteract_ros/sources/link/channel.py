@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One direction of a connection: packets arrive late, out of order, or never."""
+
+import heapq
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from noninteract_ros.sources.link.settings import LinkSettings
+
+Payload = TypeVar("Payload")
+TOLERANCE = 1e-9  # [s] by which an arrival may lie after the time that is asked for
+
+
+class Channel(Generic[Payload]):
+    """Carries packets; what happens to the n-th one depends on the seed and n alone.
+
+    Args:
+        settings: Delay, its spread, losses and whether packets overtake each other.
+        direction: Number that makes the two directions of a connection differ.
+
+    Attributes:
+        sent: How many packets were sent.
+        lost: How many of them will never arrive.
+    """
+
+    def __init__(self, settings: LinkSettings, direction: int) -> None:
+        self._settings, self._direction = settings, direction
+        self.reset()
+
+    def reset(self) -> None:
+        """Starts anew, with the same fate for the n-th packet."""
+        self._random = np.random.default_rng([self._settings.seed, self._direction])
+        self._under_way: list[tuple[float, int, Payload]] = []
+        self._last_arrival = -np.inf
+        self.sent = self.lost = 0
+
+    def send(self, now: float, payload: Payload) -> None:
+        """Sends a packet at a time [s]."""
+        settings = self._settings
+        spread, fate = self._random.uniform(-1.0, 1.0), self._random.random()
+        self.sent += 1
+        if fate < settings.loss:
+            self.lost += 1
+            return
+        arrival = now + settings.delay * (1.0 + settings.jitter * spread)
+        if not settings.reordering:
+            arrival = self._last_arrival = max(arrival, self._last_arrival)
+        heapq.heappush(self._under_way, (arrival, self.sent, payload))
+
+    def receive(self, now: float) -> list[Payload]:
+        """The packets that have arrived by a time [s] since the last call, in order of arrival."""
+        arrived = []
+        while self._under_way and self._under_way[0][0] <= now + TOLERANCE:
+            arrived.append(heapq.heappop(self._under_way)[2])
+        return arrived

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: Apache-2.0
+"""How the robots stand to each other: differences of tool points, second row of (34)."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from noninteract_ros.schema import key
+from noninteract_ros.subtasks.kinds.composed_subtask import ComposedSubtask
+from noninteract_ros.subtasks.kinds.edges import (
+    EDGES_DOC,
+    FRAME_DOC,
+    NO_SUBTASKS,
+    WORLD,
+    edge_names,
+    edge_pairs,
+    edge_places,
+    edge_weights,
+    frame_named,
+)
+from noninteract_ros.subtasks.kinds.mixed_position import MixedPosition, chosen_axes
+from noninteract_ros.subtasks.kinds.relative_parts import RelativePoints
+from noninteract_ros.subtasks.mixing import EdgeMixing
+from noninteract_ros.subtasks.subtask import Subtask
+from noninteract_ros.team.robot import AXES
+from noninteract_ros.team.team import Team
+
+
+@dataclass(frozen=True)
+class RelativePosition:
+    """Configuration block of the relative position subtask."""
+
+    kind: str = key("Kind of subtask", choices=("relative_position",))
+    edges: tuple[str, ...] = key(EDGES_DOC, ())
+    frame: str = key(FRAME_DOC, WORLD)
+    axes: tuple[str, ...] = key(
+        "Axes of the frame; by default those that all robots share", (), choices=AXES
+    )
+
+    def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
+        """The subtask for a team, with the subtasks that are listed before it.
+
+        Raises:
+            ScenarioError: The edges do not name pairs of different robots of the team, or the
+                frame is no subtask with an orientation.
+        """
+        pairs = edge_pairs(name, self.edges, team)
+        elements, weights = edge_names(pairs), edge_weights(pairs, team)
+        axes = chosen_axes(name, self.axes, team)
+        frame = frame_named(name, self.frame, others)
+        subtask: Subtask = MixedPosition(name, elements, axes, weights)
+        if frame is not None:
+            subtask = ComposedSubtask(name, elements, axes, RelativePoints(weights, frame), None)
+        subtask.mixing = EdgeMixing(axes, tuple(edge_places(pairs, team)), False, None, frame)
+        return subtask

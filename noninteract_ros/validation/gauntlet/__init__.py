@@ -1,0 +1,2 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Random passive environments against the laws, in compiled simulations."""

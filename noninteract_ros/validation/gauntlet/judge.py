@@ -1,0 +1,233 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Verdicts: a case under a law, by eigenvalues where its loop is linear, by simulation always."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.validation.gauntlet import state
+from noninteract_ros.validation.gauntlet.accounting import ACCOUNT
+from noninteract_ros.validation.gauntlet.cases import Case
+from noninteract_ros.validation.gauntlet.law import new_terms
+from noninteract_ros.validation.gauntlet.loop import growth_rate, plant_of
+from noninteract_ros.validation.gauntlet.plant import PlantArrays
+from noninteract_ros.validation.gauntlet.settings import LAWS, GauntletSettings
+from noninteract_ros.validation.gauntlet.simulation import run
+
+STATES = ("at rest", "unbounded", "not at rest", "out of reach")  # by the compiled verdict
+LEAST = 4.0  # [s] that every case runs
+WINDOW = 0.5  # [s]
+QUIET = 1e-3  # speed relative to its peak that counts as rest
+VERY_QUIET = 1e-9  # the same where eigenvalues say that rest cannot last
+GROWTH = 100.0  # energy relative to the first one that counts as unbounded
+NEUTRAL = 1e-3  # [1/s] growth that counts as none: a line of equilibria, robots that let go
+LETTING_GO = 0.5  # nu below which the impedance counts as having yielded
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of a case under a law; energies relative to the one that it began with.
+
+    Attributes:
+        index: Number of the case.
+        law: The law.
+        state: One of `STATES`.
+        time: How long it ran [s].
+        speed: Largest speed of the last window relative to the peak.
+        slowing: Largest speed of the last window relative to the one before.
+        growth: Growth rate of the linear loop [1/s], with the final gates for the gated law;
+            None where the case is not linear.
+        agreed: Whether simulation and eigenvalue say the same; None where one says nothing.
+        sigma_mean: Mean of sigma.
+        sigma_least: Smallest sigma.
+        sigma_full: Share of time with sigma = 1.
+        sigma: Last sigma.
+        grip: Last nu.
+        grip_least: Smallest nu.
+        level_least: Smallest level of the tank [J].
+        residual: Largest r = W - W(0) - supplied energy, less what the plant itself gained.
+        mismatch: Largest |r + L|, less the same.
+        imbalance: What the plant itself gained or lost.
+        sampling: Largest error of an account with power times time instead of measured work.
+        cause: Why it is not at rest, or an empty text.
+    """
+
+    index: int
+    law: str
+    state: str
+    time: float
+    speed: float
+    slowing: float
+    growth: float | None
+    agreed: bool | None
+    sigma_mean: float
+    sigma_least: float
+    sigma_full: float
+    sigma: float
+    grip: float
+    grip_least: float
+    level_least: float
+    residual: float
+    mismatch: float
+    imbalance: float
+    sampling: float
+    cause: str = ""
+
+    @property
+    def settled(self) -> bool:
+        """Whether it came to rest."""
+        return self.state == STATES[state.SETTLED]
+
+    @property
+    def yields(self) -> bool:
+        """Whether the impedance has let go."""
+        return self.grip < LETTING_GO
+
+    @property
+    def unstable(self) -> bool:
+        """Whether eigenvalue or simulation says that it grows without bound."""
+        if self.law != "energy_gated" and self.growth is not None and self.growth > NEUTRAL:
+            return True
+        return self.state == STATES[state.UNBOUNDED]
+
+
+def judge(case: Case, settings: GauntletSettings) -> list[Verdict]:
+    """A verdict for each law."""
+    plant = plant_of(case, settings.period)
+    verdicts = [_verdict(case, plant, law, settings) for law in settings.laws]
+    unsettled = [item.law for item in verdicts if not item.settled]
+    if not unsettled:
+        return verdicts
+    natural = next((item for item in verdicts if item.law == "natural"), None)
+    natural = natural or _verdict(case, plant, "natural", settings)
+    return [
+        item if item.settled else replace(item, cause=_cause(item, natural)) for item in verdicts
+    ]
+
+
+def trace(case: Case, law: str, settings: GauntletSettings, rows: int, stride: int) -> Array:
+    """A run of a case, every `stride` ticks; columns of `state.record`."""
+    table = np.full((rows, state.TRACED + 2 * case.start.shape[1] + case.team.n), np.nan)
+    seconds = rows * stride * settings.period
+    limits = _limits(settings, seconds, least=seconds)
+    _run(case, plant_of(case, settings.period), law, settings, limits, (table, stride))
+    return table[~np.isnan(table[:, 0])]
+
+
+def _verdict(case: Case, plant: PlantArrays, law: str, settings: GauntletSettings) -> Verdict:
+    linear = case.linear and settings.drop == 0.0
+    found = _judged(case, plant, law, settings, _limits(settings, settings.horizon), linear)
+    if linear and found.settled and found.growth is not None and found.growth > NEUTRAL:
+        # Quiet it is, but what grows may only have begun small.
+        patient = _limits(settings, settings.horizon, quiet=VERY_QUIET)
+        return _judged(case, plant, law, settings, patient, linear)
+    return found
+
+
+def _limits(
+    settings: GauntletSettings, seconds: float, quiet: float = QUIET, least: float = LEAST
+) -> state.Limits:
+    least, most, window = (max(1, round(t * settings.rate)) for t in (least, seconds, WINDOW))
+    return state.Limits(int(least), most, window, quiet, GROWTH)
+
+
+def _run(
+    case: Case,
+    plant: PlantArrays,
+    law: str,
+    settings: GauntletSettings,
+    limits: state.Limits,
+    traced: tuple[Array, int] | None = None,
+) -> tuple[int, int, Any, state.Memory, state.Meter]:
+    n = case.team.n
+    memory = state.new_memory(case.start, n, settings.delay)
+    meter = state.new_meter()
+    none = np.zeros((0, state.TRACED + 2 * case.start.shape[1] + n))
+    tank = ACCOUNT.settings_of(settings.tank)
+    withheld = ACCOUNT.settings_of(replace(settings.tank, refill_fraction=0.0))
+    link = state.DelayedLink(settings.period, settings.delay, settings.drop, case.index)
+    ended, ticks, account = run(
+        case.team,
+        case.around,
+        plant,
+        new_terms(case.team),
+        LAWS.index(law),
+        tank,
+        withheld,
+        link,
+        limits,
+        memory,
+        meter,
+        *(traced or (none, 1)),
+    )
+    return ended, ticks, account, memory, meter
+
+
+def _judged(
+    case: Case,
+    plant: PlantArrays,
+    law: str,
+    settings: GauntletSettings,
+    limits: state.Limits,
+    linear: bool,
+) -> Verdict:
+    ended, ticks, account, memory, meter = _run(case, plant, law, settings, limits)
+    growth = None
+    if linear:
+        gates = account.sigma, account.grip
+        growth = growth_rate(case, settings.period, settings.delay, *gates)
+    scale = float(memory.began.sum())
+    imbalance = float(meter.imbalance[0])
+    time = ticks * settings.period
+    return Verdict(
+        case.index,
+        law,
+        STATES[ended],
+        time,
+        float(meter.last[0] / meter.peak[0]),
+        float(meter.last[0] / max(meter.before[0], 1e-300)),
+        growth,
+        _agreed(ended, growth, law, time),
+        float(meter.sums[0] / meter.sums[2]),
+        float(meter.least[0]),
+        float(meter.sums[1] / meter.sums[2]),
+        account.sigma,
+        account.grip,
+        float(meter.least[1]),
+        float(meter.least[2]),
+        (float(meter.residual[0]) - imbalance) / scale,
+        (float(meter.mismatch[0]) - imbalance) / scale,
+        imbalance / scale,
+        float(meter.sampling[0]) / scale,
+    )
+
+
+def _agreed(ended: int, growth: float | None, law: str, time: float) -> bool | None:
+    """Whether the eigenvalue says what the simulation shows; None where one is silent.
+
+    A loop too slow to come to rest, or to leave, within the time is one that simulation does not
+    decide. The eigenvalue of a gated loop is that of its last gates and decides about rest alone.
+    """
+    if growth is None or ended == state.ESCAPED:
+        return None
+    if ended == state.SETTLED:
+        return growth <= NEUTRAL
+    if ended == state.UNBOUNDED:
+        return None if law == "energy_gated" else growth > 0.0
+    undecided = law == "energy_gated" or abs(growth) * time < -2.0 * np.log(QUIET)
+    return None if undecided else False
+
+
+def _cause(found: Verdict, natural: Verdict) -> str:
+    """Why a case is not at rest, in the order of what explains most."""
+    if found.unstable and found.law not in ("natural", "energy_gated"):
+        return "the law"
+    if natural.unstable or natural.state == STATES[state.UNBOUNDED]:
+        return "the natural law is unstable"
+    if found.yields:
+        return "let go"
+    if found.slowing < 1.0 or (found.growth is not None and found.growth < -1e-6):
+        return "still decaying"
+    return "sustained"

@@ -1,0 +1,118 @@
+# SPDX-License-Identifier: Apache-2.0
+"""A team under the law at random states: where its identities are measured."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.law import decoupling
+from noninteract_ros.control.law.decoupling import TaskDynamics, TaskError
+from noninteract_ros.control.law.impedance import Impedance
+from noninteract_ros.control.safety.settings import SafetySettings
+from noninteract_ros.control.safety.singularity import best_regularity, joint_range, regularity
+from noninteract_ros.errors import TeamError
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.team.team import Team, TeamState
+
+REGULAR = SafetySettings().singularity_begin  # relative; below, the law is no longer alone
+SPEED = 1.0  # [m/s or rad/s] bound of joint velocities
+ERROR = 0.2  # [SI] bound of errors, desired accelerations and forces
+REFUSALS = 1000  # draws in a row after which a team counts as singular everywhere
+LEAP = 10.0  # times the way that a subtask's velocity leads in a step; beyond, its value jumps
+
+STEP = 5e-4  # [s] between the states of a difference quotient
+PLACES = (-3, -2, -1, 1, 2, 3)  # steps at which they stand
+WEIGHTS = (-1 / 60, 9 / 60, -45 / 60, 45 / 60, -9 / 60, 1 / 60)  # central, of order 6
+
+
+@dataclass(frozen=True)
+class Sample:
+    """A random state, and what lies along its velocity.
+
+    Attributes:
+        state: Team dynamics.
+        dynamics: Task dynamics.
+        error: Tracking state that fits it.
+        around: Task dynamics at the `PLACES`, on the straight line along the velocity.
+    """
+
+    state: TeamState
+    dynamics: TaskDynamics
+    error: TaskError
+    around: tuple[TaskDynamics, ...]
+
+    def rate(self, term: Callable[[TaskDynamics], Array]) -> Array:
+        """Time derivative of a term along the velocity, to order 6 in the step."""
+        values = np.array([term(dynamics) for dynamics in self.around])
+        return np.tensordot(WEIGHTS, values, axes=1) / STEP
+
+
+class LawProbe:
+    """A team under the law, to be looked at in any state.
+
+    Args:
+        team: The robots.
+        stack: Their subtasks.
+        impedance: Gains of all subtasks.
+
+    Attributes:
+        refused: States that were drawn so far and not taken.
+    """
+
+    def __init__(self, team: Team, stack: SubtaskStack, impedance: Impedance) -> None:
+        self.team, self.stack, self.impedance = team, stack, impedance
+        self.refused = 0
+        self._least = REGULAR * best_regularity(team, stack)
+        self._range = joint_range(team)
+
+    def dynamics(self, state: TeamState) -> TaskDynamics:
+        """Task dynamics at a state."""
+        task = self.stack.evaluate(state)
+        return decoupling.task_dynamics(state, task, self.stack.slices, self.impedance.inertias)
+
+    def samples(self, count: int, seed: int) -> Iterator[Sample]:
+        """Random states in the whole range of the joints, away from singularities.
+
+        A state is drawn again where the task Jacobian is less regular than `REGULAR`, relative to
+        the team's best, or where a subtask's value jumps along the velocity, as the mean of two
+        orientations does where they face opposite ways.
+
+        Raises:
+            TeamError: No such state is found.
+        """
+        rng = np.random.default_rng(seed)
+        for _ in range(count):
+            for _ in range(REFUSALS):
+                if (sample := self._draw(rng)) is not None:
+                    break
+                self.refused += 1
+            else:
+                text = f"singular at each of {REFUSALS} random states of its joints' range"
+                raise TeamError(text)
+            yield sample
+
+    def _draw(self, rng: np.random.Generator) -> Sample | None:
+        n = self.team.n
+        q = self.team.configuration_from_joints(rng.uniform(*self._range))
+        state = self.team.state(q, rng.uniform(-SPEED, SPEED, n))
+        dynamics = self.dynamics(state)
+        e, e_rate, acceleration, force = rng.uniform(-ERROR, ERROR, (4, n))
+        if regularity(dynamics.S) < self._least or self.stack.soundness(state) < REGULAR:
+            return None
+        x_rate = dynamics.J @ state.v
+        places = [
+            self.team.state(self.team.integrate(q, place * STEP * state.v), state.v)
+            for place in PLACES
+        ]
+        if self._jumps(places, x_rate):
+            return None
+        error = TaskError(e, e_rate, x_rate - e_rate, acceleration, force)
+        return Sample(state, dynamics, error, tuple(map(self.dynamics, places)))
+
+    def _jumps(self, places: Sequence[TeamState], x_rate: Array) -> bool:
+        """Whether a value moves much further between the outer places than its velocity leads."""
+        first, *_, last = (self.stack.evaluate(state).x for state in places)
+        way = np.abs(self.stack.difference(last, first))
+        return bool(way.max() > LEAP * (PLACES[-1] - PLACES[0]) * STEP * np.abs(x_rate).max())

@@ -1,0 +1,263 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Reports of runs that somebody led by hand: each claim is judged where it can hold."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from rehearsed import DIAGNOSTICS, Act, Tamper, record, scenario_values
+
+from noninteract_ros.control.references.inputs import Rate
+from noninteract_ros.control.references.subtask_input import AUTHORITIES
+from noninteract_ros.nodes.messages.messages import Level, to_diagnostics, to_status
+from noninteract_ros.reporting.checks.checks import Check
+from noninteract_ros.reporting.figures.account_figure import account_figure
+from noninteract_ros.reporting.figures.figures import storage_figure, tracking_figure
+from noninteract_ros.reporting.figures.marks import transitions
+from noninteract_ros.reporting.metrics import intervals
+from noninteract_ros.reporting.metrics.closed_form import closed_form
+from noninteract_ros.reporting.metrics.influences import influences
+from noninteract_ros.reporting.metrics.passivity_observer import observe
+from noninteract_ros.reporting.metrics.storage_functions import account
+from noninteract_ros.reporting.recording.recorded import Recorded
+from noninteract_ros.reporting.recording.writer import RunWriter
+from noninteract_ros.reporting.report.metrics import measure
+from noninteract_ros.scenario.files import find_scenario, for_console, read_parameters
+from noninteract_ros.scenario.rehearsal import Rehearsal
+
+STORAGE = ("storage_growth", "storage_passive", "storage_rate")
+
+
+def lead(subtask: str, *velocity: float) -> Act:
+    """Asks for a velocity, as pads, keys and target_twist do."""
+
+    def act(rehearsal: Rehearsal) -> None:
+        now = rehearsal.simulation.now
+        heard = rehearsal.controller.inputs[subtask].sources["human"]
+        heard.receive(now, Rate(np.array(velocity)), now)
+
+    return act
+
+
+def law(name: str) -> Act:
+    return lambda rehearsal: rehearsal.controller.set_law(name)
+
+
+def stiffer(rehearsal: Rehearsal) -> None:
+    """Four times the stiffness of the cooperative subtask."""
+    settings = rehearsal.controller._settings[0]
+    stiffness = tuple(4.0 * k for k in settings.stiffness)
+    rehearsal.controller.set_impedance("cooperative", replace(settings, stiffness=stiffness))
+
+
+def give(subtask: str, source: str) -> Act:
+    return lambda rehearsal: rehearsal.controller.set_authority(subtask, source)
+
+
+def stop(rehearsal: Rehearsal) -> None:
+    rehearsal.controller.stop()
+
+
+def resume(rehearsal: Rehearsal) -> None:
+    rehearsal.controller.resume()
+
+
+def reset(rehearsal: Rehearsal) -> None:
+    rehearsal.simulation.reset()
+
+
+SESSION: dict[float, Act] = {
+    0.1: lead("cooperative", 0.3, 0.1),
+    0.5: give("relative", "human"),
+    0.51: lead("relative", 0.2, 0.0),
+    0.8: stop,
+    1.0: resume,
+    1.05: lead("cooperative", -0.3, 0.1),
+    1.2: law("natural"),
+    1.4: lead("cooperative", 0.2, -0.3),
+    1.5: law("energy_gated"),
+    1.8: stiffer,
+    2.0: lead("cooperative", -0.2, 0.2),
+    2.35: reset,
+    2.5: lead("cooperative", 0.2, 0.1),
+}
+
+
+def values_of(scenario: str, **changes: Any) -> dict[str, Any]:
+    """A scenario as `demo --console` runs it, without anybody but the person."""
+    values = for_console(read_parameters(find_scenario(scenario)), 0)
+    return {name: item for name, item in values.items() if name != "planner"} | changes
+
+
+def measured(
+    folder: Path,
+    values: Mapping[str, Any],
+    acts: Mapping[float, Act],
+    tamper: Tamper | None = None,
+) -> tuple[Recorded, dict[str, Check]]:
+    told = {"changed parameters": "cooperative.stiffness" if stiffer in acts.values() else "none"}
+
+    def tell(writer: RunWriter) -> None:
+        said = to_diagnostics(1, [to_status("/team/controller", Level.OK, "running", told)])
+        writer.add("/diagnostics", DIAGNOSTICS, 2, 2, serialize_message(said))
+
+    recorded = Recorded(record(folder, values, 3.0, tamper, tell, acts))
+    found = measure(recorded, other_laws=False)
+    return recorded, {check.name: check for check in found.checks}
+
+
+@pytest.fixture(scope="module", params=["paper", "planar_arms"])
+def session(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[Recorded, dict[str, Check]]:
+    return measured(tmp_path_factory.mktemp(request.param), values_of(request.param), SESSION)
+
+
+def test_a_run_that_is_led_by_hand_fails_no_claim(
+    session: tuple[Recorded, dict[str, Check]],
+) -> None:
+    """With hand-overs, a stop, other laws and gains, and a reset; where one is told, it holds."""
+    _, checks = session
+    assert [check for check in checks.values() if check.passed is False] == []
+    for claim in ("storage_passive", "storage_rate"):
+        assert checks[f"{claim}.cooperative"].passed
+        assert checks[f"{claim}.relative"].passed
+    assert "law changed to natural" in checks["reproduction"].reason
+
+
+def test_what_is_judged_leaves_out_just_what_is_not_the_laws(
+    session: tuple[Recorded, dict[str, Check]],
+) -> None:
+    """Changes as long as they fade, the stop, the reset; everything else is in."""
+    recorded, _ = session
+    found = account(recorded, "cooperative")
+    middle = 0.5 * (found.t[1:] + found.t[:-1])
+    fade = recorded.scenario.general.transition_time
+    out = [(0.8, 1.0 + fade), (1.2, 1.2 + fade), (1.5, 1.5 + fade), (1.8, 1.8 + fade)]
+    near = 3.0 / recorded.scenario.general.telemetry_rate
+    for first, last in out:
+        inside = (middle > first + near) & (middle < last - near)
+        assert inside.any()
+        assert not found.in_force[inside].any()
+    clear = np.ones(len(middle), dtype=bool)
+    for first, last in [*out, (2.35, 2.35)]:
+        clear &= (middle < first - near) | (middle > last + near)
+    gates = account_of_gates(recorded, middle)
+    assert found.in_force[clear & gates].all()
+    assert (found.law[(found.t > 1.21) & (found.t < 1.49)] == "natural").all()
+
+
+def account_of_gates(recorded: Recorded, t: np.ndarray) -> np.ndarray:
+    """Whether nothing but a change or a stop took part in the torque around each time."""
+    told = recorded.told("cooperative", "interventions")
+    assert told is not None
+    counts = np.interp(t - 0.02, *told), np.interp(t + 0.02, *told)
+    return np.asarray(counts[0] == counts[1])
+
+
+def test_each_subtask_still_follows_its_own_equation(tmp_path: Path) -> None:
+    """(29) is judged between the changes, by the motion that was asked for; gains are not told."""
+    acts = {time: act for time, act in SESSION.items() if act is not stiffer}
+    recorded, checks = measured(tmp_path / "sound", values_of("paper"), acts)
+    for name in ("closed_form.cooperative", "closed_form.relative"):
+        assert checks[name].passed
+    found = closed_form(recorded, "cooperative", influences(recorded))
+    assert found.t.size < 0.95 * len(recorded.t)
+    assert not ((found.t > 1.25) & (found.t < 1.45)).any()  # Under `natural`.
+
+    def drift(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+        if topic == "joint_states" and time > 2.6:
+            arrays[0] = arrays[0] + [0.05 * (time - 2.6), 0.0, 0.0, 0.0]
+        return arrays
+
+    _, broken = measured(tmp_path / "broken", values_of("paper"), acts, drift)
+    assert broken["closed_form.relative"].passed is False
+
+
+def test_a_reset_is_no_motion(session: tuple[Recorded, dict[str, Check]]) -> None:
+    """The observer of energies does not take it for work that somebody did."""
+    recorded, _ = session
+    put = recorded.t[1:][~intervals.moved_by_itself(recorded)]
+    np.testing.assert_allclose(put, [2.35])
+    assert observe(recorded).gaps == 1
+
+
+def test_who_leads_is_told(session: tuple[Recorded, dict[str, Check]]) -> None:
+    """Nobody, before the person speaks and where they let go."""
+    recorded, _ = session
+    told = recorded.told("cooperative", "leader")
+    assert told is not None
+    leader = dict(zip(np.round(told[0], 3).tolist(), told[1].astype(int).tolist(), strict=True))
+    assert AUTHORITIES[leader[0.04]] == "hold"
+    assert AUTHORITIES[leader[0.4]] == "human"
+    assert AUTHORITIES[leader[0.72]] == "hold"
+    assert recorded.start("cooperative") == pytest.approx(0.1, abs=0.005)
+
+
+def test_figures_show_who_led_and_when_the_law_was_not_alone(
+    session: tuple[Recorded, dict[str, Check]],
+) -> None:
+    """A shade for the stop, each change and the new start; words for whoever leads for long."""
+    recorded, _ = session
+    spans = transitions(recorded)
+    starts = [0.8, 1.5, 1.8]  # The change at 1.2 s begins where the resume has faded.
+    assert all(any(abs(first - start) < 0.02 for first, _ in spans) for start in starts)
+    for figure in (tracking_figure(recorded, "relative"), storage_figure(recorded)):
+        assert [len(axes.patches) for axes in figure.axes] == [len(spans)] * 2
+        (legend,) = figure.legends
+        assert legend.get_texts()[-1].get_text() == "stop or change"
+    assert storage_figure(recorded).axes[1].get_xlabel() == "time [s]"
+    assert account_figure(recorded).axes[2].get_legend() is not None
+
+
+def test_a_hand_over_is_written_above_the_curves(tmp_path: Path) -> None:
+    """Dotted lines where the next one takes over, and who it is."""
+    values = values_of("paper") | {"planner": read_parameters(find_scenario("paper"))["planner"]}
+    acts = {
+        0.4: give("relative", "human"),
+        **{0.31 + 0.1 * k: lead("relative", 0.1, 0.0) for k in range(1, 10)},
+    }
+    recorded = Recorded(record(tmp_path, values, 1.2, acts=acts))
+    figure = tracking_figure(recorded, "relative")
+    assert {text.get_text() for text in figure.axes[0].texts} == {"autonomy", "human"}
+    assert not list(tracking_figure(recorded, "cooperative").axes[0].texts)
+
+
+def test_energy_that_nobody_supplied_is_still_found(tmp_path: Path) -> None:
+    """After all that, storage that grows by itself fails both claims."""
+
+    def pumped(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
+        if topic == "relative/energy" and time > 2.6:
+            arrays[0][1] += 0.5 * (time - 2.6)
+        return arrays
+
+    _, checks = measured(tmp_path, values_of("paper"), SESSION, pumped)
+    assert checks["storage_passive.relative"].passed is False
+    assert checks["storage_rate.relative"].passed is False
+
+
+def test_bounds_do_not_grow_with_a_reset(tmp_path: Path) -> None:
+    """What the torque does where the team is put elsewhere excuses nothing."""
+    moves = {0.1: lead("cooperative", 0.3, 0.1)}
+    limits = [
+        measured(tmp_path / str(len(acts)), values_of("planar_arms"), acts)[1]
+        for acts in (moves, moves | {0.4: reset})
+    ]
+    for claim in STORAGE:
+        name = f"{claim}.cooperative"
+        assert limits[1][name].limit < 3.0 * limits[0][name].limit
+
+
+def test_a_law_that_does_not_decouple_is_asked_for_the_balance_only(tmp_path: Path) -> None:
+    """Where it is in force all the time the claims say so; gates are none of its."""
+    values = scenario_values(law="energy_gated", object=None)
+    _, checks = measured(tmp_path, values, {0.0: law("natural")})
+    for name in ("storage_growth.relative", "storage_passive.relative"):
+        assert checks[name].passed is None
+        assert "natural" in checks[name].reason
+    assert checks["storage_rate.relative"].passed
+    assert checks["account.sigma"].passed is None

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The account of the port where a team is touched: metrics, checks and the fifth figure."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rehearsed import record, scenario_values, told
+
+from noninteract_ros.errors import RecordingError
+from noninteract_ros.reporting.figures.account_figure import account_figure
+from noninteract_ros.reporting.metrics.passivity_observer import observe, surroundings_work
+from noninteract_ros.reporting.metrics.team_account import account_metrics, team_account
+from noninteract_ros.reporting.recording.recorded import Recorded
+
+
+def gated(**changes: Any) -> dict[str, Any]:
+    return scenario_values(law="energy_gated", **changes)
+
+
+@pytest.fixture(scope="module")
+def pair(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    return Recorded(record(tmp_path_factory.mktemp("pair"), gated(), 1.2))
+
+
+def passed(checks: list[Any]) -> dict[str, bool | None]:
+    return {check.name.removeprefix("account."): check.passed for check in checks}
+
+
+def test_an_experiment_that_nobody_touches_keeps_both_gates_open(pair: Recorded) -> None:
+    """The metrics are those of the columns."""
+    metrics, checks = account_metrics(pair)
+    assert passed(checks) == {"residual": True, "sigma": True, "grip": True}
+    found = team_account(pair)
+    assert metrics["sigma_min"] == 1.0
+    assert metrics["sigma_below_1_s"] == 0.0
+    assert metrics["tank_min_J"] == found.tank.min()
+    assert metrics["tank_max_J"] == found.tank.max()
+    assert metrics["residual_max_J"] == found.residual.max()
+    assert metrics["lost_J"] == found.lost[-1] > 0.0
+    assert metrics["accounts"] == 1
+
+
+def test_a_gate_that_closes_is_found_and_timed(tmp_path: Path) -> None:
+    """A tenth of a second at sigma 0.4, in a run where it has no reason to."""
+
+    def closed(columns: dict[str, float]) -> None:
+        if 0.2999 < columns["time"] < 0.3999:
+            columns["sigma"] = 0.4
+
+    metrics, checks = account_metrics(Recorded(record(tmp_path, gated(), 0.6, told(closed))))
+    assert passed(checks) == {"residual": True, "sigma": False, "grip": True}
+    assert metrics["sigma_min"] == 0.4
+    assert metrics["sigma_below_1_s"] == pytest.approx(0.1, abs=1e-9)
+
+
+def test_energy_from_nowhere_is_no_rounding(tmp_path: Path) -> None:
+    """A microjoule of residual fails, and so does one that is no number."""
+    for wrong in (1e-6, np.nan):
+
+        def more(columns: dict[str, float], wrong: float = wrong) -> None:
+            columns["residual"] = wrong
+
+        _, checks = account_metrics(Recorded(record(tmp_path, gated(), 0.2, told(more))))
+        assert passed(checks)["residual"] is False
+
+
+@pytest.mark.parametrize("law", ["natural", "noninteracting"])
+def test_other_laws_have_no_gates_but_an_account(tmp_path: Path, law: str) -> None:
+    """It is kept as an observer."""
+    metrics, checks = account_metrics(Recorded(record(tmp_path, scenario_values(law=law), 0.3)))
+    assert passed(checks) == {"residual": True, "sigma": None, "grip": None}
+    assert metrics["sigma_min"] is None
+    assert metrics["gated_s"] == 0.0
+
+
+def test_what_the_team_touches_may_close_a_gate(tmp_path: Path) -> None:
+    """Then there is nothing to claim."""
+    push = {"robot": "robot_1", "start": 0.1, "duration": 0.1, "force": [9.0, 0.0, 0.0]}
+    run = Recorded(record(tmp_path, gated() | {"pushes": ["shove"], "shove": push}, 0.3))
+    _, checks = account_metrics(run)
+    assert passed(checks) == {"residual": True, "sigma": None, "grip": None}
+    assert "shove" in checks[1].reason
+
+
+def test_without_an_account_the_reason_is_given(tmp_path: Path) -> None:
+    """Old recordings are read all the same."""
+
+    def silent(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
+        return None if topic == "energy" else arrays
+
+    run = Recorded(record(tmp_path, gated(), 0.2, silent))
+    metrics, checks = account_metrics(run)
+    assert "energy" in metrics["reason"]
+    assert set(passed(checks).values()) == {None}
+    with pytest.raises(RecordingError, match="energy"):
+        account_figure(run)
+
+
+def test_the_fifth_figure_shows_all_of_the_account(pair: Recorded) -> None:
+    """Energies, powers, gates and sums over time, each as recorded."""
+    figure = account_figure(pair)
+    found = team_account(pair)
+    expected = [
+        ("energy [J]", [found.storage, found.tank, found.reserve]),
+        ("power [W]", [found.supplied, found.dissipated, found.demand]),
+        ("gate", [found.sigma, found.grip]),
+        ("energy [J]", [found.received, found.residual]),
+    ]
+    assert [axes.get_ylabel() for axes in figure.axes] == [label for label, _ in expected]
+    assert figure.axes[-1].get_xlabel() == "time [s]"
+    for axes, (_, columns) in zip(figure.axes, expected, strict=True):
+        for line, column in zip(axes.lines, columns, strict=False):
+            np.testing.assert_array_equal(line.get_xdata(), found.t)
+            np.testing.assert_allclose(line.get_ydata(), column, rtol=1e-12, atol=1e-12)
+        assert axes.get_legend() is not None
+    low, high = figure.axes[2].get_ylim()
+    assert low < 0.0 < 1.0 < high
+    observed = figure.axes[3].lines[2]
+    np.testing.assert_array_equal(observed.get_ydata(), surroundings_work(observe(pair))[1])

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Both ends of a link between a hand, a network and a team that do their worst."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.sources.link.energy_budget import Packet
+from noninteract_ros.sources.link.settings import LinkSettings
+from noninteract_ros.sources.link.time_domain_passivity import ObservedDevice, ObservedTeam
+from noninteract_ros.subtasks.layout import Layout
+from noninteract_ros.subtasks.reference import Reference
+
+FORCE = 20.0  # [N] of the team, at most
+Moved = tuple[Array, Array]
+"""Displacement over a tick (p,) and the velocity that is measured after it (p,)."""
+
+Hand = Callable[[Array], Moved]
+"""A hand: what it does in a tick under a force that it knows."""
+
+
+@dataclass
+class Deaf:
+    """A network of bursts: for a while nothing arrives, then everything, shuffled and twice."""
+
+    rng: np.random.Generator
+    longest: float = 0.4
+
+    def __post_init__(self) -> None:
+        self._waiting: list[Packet] = []
+        self._until = 0.0
+
+    def send(self, _now: float, packet: Packet) -> None:
+        """Keeps a packet, or loses it."""
+        if self.rng.random() > 0.05:
+            self._waiting.append(packet)
+
+    def receive(self, now: float) -> Iterator[Packet]:
+        """All that have waited, some for good, some twice."""
+        if now < self._until:
+            return
+        self._until = now + self.rng.uniform(0.0, self.longest) * (self.rng.random() < 0.2)
+        waiting, self._waiting = self._waiting, []
+        if self.rng.random() < 0.2:
+            waiting = waiting[: len(waiting) // 2]
+        for index in self.rng.permutation(np.repeat(np.arange(len(waiting)), 2)):
+            yield waiting[index]
+
+
+class Loop:
+    """A link of which neither the hand nor the team is passive.
+
+    The team pushes the way the hand goes, or anywhere.
+
+    Args:
+        settings: The connection.
+        layout: Layout of the values.
+        hand: What moves the device.
+        network: The two directions.
+        period: Tick [s].
+        ends: Kinds of the device's end and of the team's.
+    """
+
+    def __init__(
+        self,
+        settings: LinkSettings,
+        layout: Layout,
+        hand: Hand,
+        network: tuple,
+        period: float = 1e-3,
+        ends: tuple[type[ObservedDevice], type[ObservedTeam]] = (ObservedDevice, ObservedTeam),
+    ) -> None:
+        metric = np.ones(layout.dim)
+        metric[layout.angular] = 0.02
+        self._layout, self._hand, self._period = layout, hand, period
+        self._there, self._back = network
+        self._rng = np.random.default_rng(5)
+        self._motion = Reference.still(layout.identity, layout)
+        self.device = ends[0](settings, metric, period)
+        self.team = ends[1](settings, layout, metric, period, self._motion)
+        self._root = np.sqrt(metric)
+        self.force = self.miss = self.debt = self.least = 0.0
+
+    def run(self, ticks: int) -> "Loop":
+        """Lets all do their worst; notes greatest force, miss and debt, and the least balance."""
+        feedback = np.zeros(self._layout.dim)
+        for tick in range(ticks):
+            if tick % 20 == 0:
+                feedback = self._push()
+            self._tick(tick * self._period, feedback)
+            self.debt = max(self.debt, -self.device.budget.level)
+            self.least = min(self.least, self.device.port.taken - self.device.port.given)
+        return self
+
+    def _push(self) -> Array:
+        push = self._rng.normal(size=self._layout.dim)
+        if self._rng.random() < 0.7 and self._motion.velocity.any():
+            push = self._motion.velocity * np.sign(self._rng.normal() + 1.0)
+        return FORCE * push / np.linalg.norm(push)
+
+    def _tick(self, now: float, feedback: Array) -> None:
+        self._back.send(now, self.team.packet(feedback))
+        for packet in self._back.receive(now):
+            self.device.hear(packet)
+        expected = self._period * self._motion.velocity
+        force = self.device.force(self._motion.velocity)
+        way, velocity = self._hand(force)
+        self.force = max(self.force, float(np.linalg.norm(force / self._root)))
+        self.miss = max(self.miss, float(np.linalg.norm((way - expected) * self._root)))
+        place = self._layout.sum(self._motion.position, way)
+        self._motion = Reference(place, velocity, np.zeros_like(velocity))
+        self._there.send(now + self._period, self.device.moved(force, way, self._motion))
+        for packet in self._there.receive(now + self._period):
+            self.team.hear(packet)
+        self.team.advance(feedback)
+
+
+def tremor(dim: int, frequency: float, period: float = 1e-3, amplitude: float = 5e-4) -> Hand:
+    """A hand that nearly stands still, trembling about a slow drift to and fro."""
+    rates = 2.0 * np.pi * frequency * (1.0 + 0.01 * np.arange(dim))
+    slow = 2.0 * np.pi * 0.3
+    tick = 0
+
+    def motion(t: float) -> Moved:
+        x = amplitude * np.sin(rates * t) + 0.01 * np.sin(slow * t)
+        v = amplitude * rates * np.cos(rates * t) + 0.01 * slow * np.cos(slow * t)
+        return x, v
+
+    def move(_force: Array) -> Moved:
+        nonlocal tick
+        (before, _), (after, velocity) = motion(tick * period), motion((tick + 1) * period)
+        tick += 1
+        return after - before, velocity
+
+    return move
+
+
+def greedy(dim: int, period: float = 1e-3, acceleration: float = 50.0) -> Hand:
+    """A hand that goes the way the force of the very tick pulls, within 5 cm and 0.3 m/s."""
+    x, v = np.zeros(dim), np.zeros(dim)
+
+    def move(force: Array) -> Moved:
+        nonlocal x, v
+        pull = force if np.linalg.norm(x) < 0.05 else -x
+        length = np.linalg.norm(pull)
+        a = acceleration * pull / length if length > 0.0 else -10.0 * v - 50.0 * x
+        if np.linalg.norm(v + period * a) > 0.3:
+            a = -acceleration * v / np.linalg.norm(v)
+        way = period * v + 0.5 * period**2 * a
+        x, v = x + way, v + period * a
+        return way, v
+
+    return move
+
+
+def liar(dim: int, period: float = 1e-3, speed: float = 0.05) -> Hand:
+    """A hand that always goes with the force, behind a velocity that says the opposite."""
+    x = np.zeros(dim)
+
+    def move(force: Array) -> Moved:
+        nonlocal x
+        length = np.linalg.norm(force)
+        goal = force / length if length > 0.0 else -10.0 * x
+        way = period * speed * goal
+        x = x + way
+        return way, -way / period
+
+    return move
+
+
+def jerky(dim: int, period: float = 1e-3, seed: int = 3) -> Hand:
+    """A hand that jumps anywhere, more and more seldom farther than before."""
+    rng = np.random.default_rng(seed)
+
+    def move(_force: Array) -> Moved:
+        scale = 1e-4 * rng.exponential()
+        return scale * rng.normal(size=dim), scale / period * rng.normal(size=dim)
+
+    return move

@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Input of people: dead-man's switch, dead zone, workspace, clutch; references never jump."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.control.references.desired_motion import DesiredMotion
+from noninteract_ros.control.references.inputs import Rate, Target
+from noninteract_ros.errors import InputError, ScenarioError
+from noninteract_ros.scenario import Scenario
+from noninteract_ros.schema import load
+from noninteract_ros.sources.human.input_settings import OperatorSettings
+from noninteract_ros.sources.human.input_shaping import DeadMan, OperatorInput, deflection
+from noninteract_ros.subtasks import so3
+from noninteract_ros.subtasks.reference import Reference
+from noninteract_ros.subtasks.subtask import Subtask
+
+STEP = 1e-3
+TURN = np.array([0.0, 0.0, np.sin(0.5), np.cos(0.5)])
+LEVEL = np.array([0.0, 0.0, 0.0, 1.0])
+GAINS = {"stiffness": [50.0], "damping": [30.0]}
+
+
+def planar() -> Subtask:
+    """The cooperative position of two robots that move in a plane: x and y."""
+    values = {
+        "robots": ["a", "b"],
+        "a": {"mass": 1.0},
+        "b": {"mass": 1.0, "initial_position": [1.0, 0.0]},
+        "subtasks": ["cooperative", "relative"],
+        "cooperative": {"kind": "cooperative_position", **GAINS},
+        "relative": {"kind": "relative_position", **GAINS},
+    }
+    scenario = Scenario.from_dict(values)
+    return scenario.build_stack(scenario.build_team()).subtasks[0]
+
+
+class Pose(Subtask):
+    """A subtask of one pose, of which only the layout is used."""
+
+    name, elements, axes, rotates = "cooperative", ("cooperative",), ("x", "y", "z"), True
+
+    def __init__(self) -> None: ...
+
+    def evaluate(self, state: Any) -> Any:
+        """Not used."""
+        raise NotImplementedError
+
+
+def limits(task: Subtask, velocity: float = 1.0) -> Array:
+    """Bounds of velocity, acceleration and jerk."""
+    return np.outer([velocity, 5.0, 50.0], np.ones(task.layout.dim))
+
+
+def operator_input(task: Subtask, **keys: Any) -> OperatorInput:
+    """Input with a block as a scenario file gives it."""
+    return OperatorInput(load(OperatorSettings, keys, "operator"), task, limits(task))
+
+
+def pose(*position: float, turn: Array = LEVEL) -> Array:
+    """A device's pose."""
+    return np.concatenate([position, turn])
+
+
+def test_silence_lets_go_until_it_is_taken_hold_of_anew() -> None:
+    """A device that comes back with the button still pressed leads nobody."""
+    switch = DeadMan(0.25)
+    switch.note(0.0, held=True)
+    assert switch.held(0.25)
+    assert not switch.held(0.26)
+    switch.note(0.3, held=True)
+    assert not switch.held(0.3)
+    switch.note(0.4, held=False)
+    switch.note(0.5, held=True)
+    assert switch.held(0.5)
+
+
+def test_a_gap_lets_go_even_if_nobody_asked_meanwhile() -> None:
+    """The next message after a silence finds the switch let go."""
+    switch = DeadMan(0.25)
+    switch.note(0.0, held=True)
+    switch.note(1.0, held=True)
+    assert not switch.held(1.0)
+
+
+def test_deflections_are_zero_in_the_dead_zone_continuous_and_odd() -> None:
+    """They grow from the edge of the dead zone to 1 at the end, either way alike."""
+    x = np.linspace(-1.2, 1.2, 2401)
+    found = deflection(x, 0.1, 1.5)
+    np.testing.assert_array_equal(found[np.abs(x) <= 0.1], 0.0)
+    np.testing.assert_allclose(found, -found[::-1], atol=1e-12)
+    assert found[-1] == 1.0
+    assert np.abs(np.diff(found)).max() < 0.002
+    assert (np.diff(found) >= 0.0).all()
+
+
+def test_sticks_become_rates_of_the_coordinates_that_there_are() -> None:
+    """A planar subtask takes x and y; a pose all, with the angular ones in their places."""
+    stick = np.array([1.0, -0.5, 0.25, 0.1, 0.2, 1.0])
+    flat = operator_input(planar(), linear_speed=0.2).rate(stick, Reference.still(np.zeros(2)))
+    np.testing.assert_allclose(flat, [0.2, -0.1])
+    task = Pose()
+    found = operator_input(task, linear_speed=0.2, angular_speed=0.5)
+    np.testing.assert_allclose(
+        found.rate(stick, Reference.still(task.layout.identity, task.layout)),
+        [0.2, -0.1, 0.05, 0.05, 0.1, 0.5],
+    )
+
+
+def test_nobody_leads_out_of_the_workspace() -> None:
+    """At full deflection and any start the shaped motion ends in the box, near its end."""
+    task = planar()
+    found = operator_input(
+        task, linear_speed=1.0, workspace=[1.0, 0.4], workspace_centre=[0.2, 0.0]
+    )
+    desired = DesiredMotion(limits(task), False, task.layout)
+    desired.rest_at(np.array([-0.2, 0.1]))
+    stick = np.array([1.0, -1.0, 0.0, 0.0, 0.0, 0.0])
+    furthest = np.full(2, -np.inf)
+    rate = np.zeros(2)
+    late = [desired.now] * 40  # What the operator's program knows is 40 ms old.
+    for tick in range(4000):
+        if tick % 20 == 0:
+            rate = found.rate(stick, late[0])
+        now = desired.advance(Rate(rate), STEP)
+        late = [*late[1:], now]
+        furthest = np.maximum(furthest, now.position * [1.0, -1.0])
+    np.testing.assert_allclose(furthest, [0.7, 0.2], atol=2e-3)
+    assert (furthest < [0.7005, 0.2005]).all()
+    outside = Reference.still([0.9, 0.0])
+    assert found.rate(stick, outside)[0] == 0.0
+    assert found.rate(-stick, outside)[0] < 0.0  # Back is always allowed.
+
+
+def test_a_clutch_leads_from_where_the_subtask_is() -> None:
+    """Taking hold asks for the very value; then the device's motion counts, scaled and turned."""
+    task = Pose()
+    found = operator_input(task, linear_scale=2.0, angular_scale=0.5)
+    value = np.concatenate([[1.0, 2.0, 3.0], so3.exp(np.array([0.3, -0.2, 0.1]))])
+    start = pose(5.0, 0.0, -1.0, turn=TURN)
+    found.engage(start, value)
+    np.testing.assert_allclose(found.target(start), value, atol=1e-12)
+    turn = np.array([0.2, 0.4, -0.6])
+    moved = pose(5.1, -0.2, -1.0, turn=so3.product(so3.exp(turn), TURN))
+    gap = task.layout.difference(found.target(moved), value)
+    np.testing.assert_allclose(gap, [0.2, -0.4, 0.0, 0.1, 0.2, -0.3], atol=1e-12)
+
+
+def test_a_target_stays_in_the_workspace() -> None:
+    """The device may leave; the set-point stays at the end of the box."""
+    found = operator_input(planar(), workspace=[1.0, 1.0])
+    found.engage(pose(0.0, 0.0, 0.0), np.array([0.2, 0.2]))
+    np.testing.assert_allclose(found.target(pose(9.0, -0.1, 4.0)), [0.5, 0.1])
+
+
+def test_without_a_clutch_there_is_no_target() -> None:
+    """A pose alone leads nobody."""
+    found = operator_input(planar())
+    with pytest.raises(InputError, match="clutch"):
+        found.target(pose(0.0, 0.0, 0.0))
+    found.engage(pose(0.0, 0.0, 0.0), np.zeros(2))
+    found.release()
+    assert not found.clutched
+
+
+def test_taking_over_letting_go_and_taking_hold_again_never_jump() -> None:
+    """Pose and rotation: through grabs, releases and device jumps the bounds are kept."""
+    task = Pose()
+    bounds = limits(task, 0.6)
+    found = operator_input(task, linear_scale=1.5)
+    desired = DesiredMotion(bounds, False, task.layout)
+    desired.rest_at(task.layout.identity)
+    rng = np.random.default_rng(5)
+    device, held = pose(0.0, 0.0, 0.0), False
+    trace: list[Reference] = []
+    for tick in range(6000):
+        if tick % 150 == 0:  # The clutch comes and goes at any time, in mid-motion.
+            held = not held
+            if held:
+                found.engage(device, desired.now.position)
+            else:
+                found.release()
+        if tick % 400 == 0 and not held:  # While it is let go the device is put elsewhere.
+            device = pose(*rng.normal(size=3), turn=so3.exp(rng.normal(size=3)))
+        if tick % 20 == 0 and held:
+            turn = so3.product(so3.exp(0.02 * rng.normal(size=3)), device[3:])
+            device = pose(*(device[:3] + 0.02 * rng.normal(size=3)), turn=turn)
+        motion = Target(found.target(device), np.zeros(6)) if held else Rate(np.zeros(6))
+        trace.append(desired.advance(motion, STEP))
+    layout = task.layout
+    position = np.array([item.position for item in trace])
+    velocity = np.array([item.velocity for item in trace])
+    way = layout.difference(position[1:], position[:-1])
+    assert np.abs(way[:, :3]).max() <= 0.6 * STEP * (1 + 1e-9)
+    assert np.abs(np.diff(velocity[:, :3], axis=0)).max() <= 5.0 * STEP * (1 + 1e-6)
+    # Rotation vectors are bounded, whose rate is not less than the angular velocity.
+    assert np.linalg.norm(way[:, 3:], axis=1).max() <= np.sqrt(3.0) * 0.6 * STEP * (1 + 1e-6)
+    assert np.abs(velocity).max() > 0.3  # It did move.
+
+
+def test_what_does_not_fit_the_subtask_is_refused() -> None:
+    """A workspace of another size; the error names key and size."""
+    with pytest.raises(ScenarioError, match=r"operator\.workspace: .*2 numbers"):
+        operator_input(planar(), workspace=[1.0, 1.0, 1.0])

@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The gauntlet: its loops against the product's controller, its verdicts against each other."""
+
+import json
+from dataclasses import astuple
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from noninteract_ros import cli
+from noninteract_ros.control.controller import TeamController
+from noninteract_ros.control.energy import tank as energy_tank
+from noninteract_ros.control.energy.tank import Interval, TankSettings
+from noninteract_ros.control.law.impedance import ImpedanceSettings
+from noninteract_ros.control.references.subtask_input import InputSettings
+from noninteract_ros.subtasks.kinds.cooperative_position import CooperativePosition
+from noninteract_ros.subtasks.kinds.relative_position import RelativePosition
+from noninteract_ros.subtasks.reference import Reference
+from noninteract_ros.subtasks.stack import SubtaskStack
+from noninteract_ros.team.models.planar_arm import PlanarArm
+from noninteract_ros.team.models.point_mass import PointMass
+from noninteract_ros.team.robot import Robot
+from noninteract_ros.team.team import Team
+from noninteract_ros.validation.gauntlet import cases, plant
+from noninteract_ros.validation.gauntlet.accounting import ACCOUNT
+from noninteract_ros.validation.gauntlet.arrays import SurroundingsArrays
+from noninteract_ros.validation.gauntlet.cases import Case, make_case
+from noninteract_ros.validation.gauntlet.check import counted, run_cases
+from noninteract_ros.validation.gauntlet.judge import judge, trace
+from noninteract_ros.validation.gauntlet.loop import growth_rate, plant_of
+from noninteract_ros.validation.gauntlet.settings import LAWS, GauntletSettings
+from noninteract_ros.validation.gauntlet.state import TRACED
+from noninteract_ros.validation.gauntlet.surroundings import Element, assembled
+
+AXES = ("x", "y")
+HALF_TICK = 0.5e-3
+# From the mean of two masses on one axis to planar arms, with and without weight.
+CASES = (0, 3, 4, 9, 14)
+
+
+def test_the_compiled_account_is_the_products_to_the_last_bit() -> None:
+    """Random intervals, booked one after the other by both, leave the same numbers."""
+    settings = TankSettings()
+    compiled = ACCOUNT.settings_of(settings)
+    ours = ACCOUNT.full_tank(compiled, 0.3)
+    theirs = energy_tank.full_tank(settings, 0.3)
+    rng = np.random.default_rng(0)
+    for _ in range(2000):
+        works, jump = rng.normal(0.0, 0.05, 3), rng.normal() * 0.01
+        potentials = rng.uniform(0.0, 1.0, 2)
+        values = [1e-3, *works, *potentials, jump, 1.0, rng.normal() * 20.0]
+        amounts = [float(value) for value in values]
+        ours = ACCOUNT.step(ours, ACCOUNT.interval(*amounts), compiled)
+        theirs = energy_tank.step(theirs, Interval(*amounts), settings)
+        assert tuple(ours) == astuple(theirs)
+    assert tuple(ACCOUNT.observed(ours, 0.0)) == astuple(energy_tank.observed(theirs, 0.0))
+
+
+def robots_of(case: Case) -> list[Robot]:
+    """The same robots as the product has them."""
+    if not case.arms:
+        axes = AXES[: case.axes]
+        masses = case.team.masses[:: case.axes]
+        return [PointMass(float(m), axes=axes).build(f"r{i}") for i, m in enumerate(masses)]
+    arms = []
+    for i, (l1, l2, alpha, _, delta, *_) in enumerate(case.team.arms):
+        m2 = 3.0 * delta / l2**2
+        m1 = 3.0 * (alpha - m2 * l1**2 - delta) / l1**2
+        start = tuple(case.start[0, 2 * i : 2 * i + 2])
+        arm = PlanarArm(link_lengths=(l1, l2), link_masses=(m1, m2), initial_position=start)
+        arms.append(arm.build(f"r{i}"))
+    return arms
+
+
+def controller_of(case: Case, law: str) -> TeamController:
+    """The product's controller of a case, told to keep all errors at zero."""
+    gravity = (0.0, -9.81, 0.0) if case.arms and case.team.arms[0, 6] else (0.0, 0.0, 0.0)
+    team = Team(robots_of(case), gravity)
+    axes = AXES[: case.axes]
+    subtasks = [
+        CooperativePosition("cooperative_position", axes=axes).build("mean", team),
+        RelativePosition("relative_position", axes=axes).build("apart", team),
+    ]
+    K, D, first = case.team.stiffness, case.team.damping, case.team.first
+    gains = [
+        ImpedanceSettings(tuple(map(float, K[part])), tuple(map(float, D[part])))
+        for part in (slice(0, first), slice(first, None))
+    ]
+    led = InputSettings("human", timeout=100.0, takeover="direct")
+    controller = TeamController(team, SubtaskStack(team, subtasks), law, gains, [led, led])
+    reference = case.team.mixing @ case.team.y_ref
+    for item, part in zip(
+        controller.inputs.values(), (slice(0, first), slice(first, None)), strict=True
+    ):
+        still = np.zeros(len(reference[part]))
+        item.sources["human"].receive(0.0, Reference(reference[part], still, still), 0.0)
+    return controller
+
+
+@pytest.mark.parametrize(
+    ("law", "delay", "drop"),
+    [*((law, 0, 0.0) for law in LAWS), ("energy_gated", 3, 0.0), ("energy_gated", 0, 0.2)],
+)
+@pytest.mark.parametrize("index", CASES)
+def test_torques_and_account_are_the_products(
+    index: int, law: str, delay: int, drop: float
+) -> None:
+    """The product's controller, shown the gauntlet's states, commands and books the same.
+
+    A small tank, so that it runs empty and both gates move within the second.
+    """
+    tank = TankSettings(capacity=0.02, initial=0.01, reopening_level=0.015, full_gate=0.01)
+    settings = GauntletSettings(delay=delay, drop=drop, tank=tank)
+    case = make_case(2, index, settings.reaction)
+    rows = trace(case, law, settings, 600, 1)
+    controller = controller_of(case, law)
+    controller.gate.settings = tank
+    controller.gate.restart()
+    n, m = case.team.n, case.start.shape[1]
+    torques = rows[:, TRACED + 2 * m :]
+    draws = np.random.RandomState(index)
+    size = np.abs(torques).max()
+    for k, row in enumerate(rows[: len(rows) - delay]):
+        if k and drop and draws.random_sample() < drop:
+            continue
+        q, v = row[TRACED : TRACED + n], row[TRACED + m : TRACED + m + n]
+        applied = torques[k - 1] if k and delay else None
+        tick = controller.step(1e-3 * k, q.copy(), v.copy(), applied)
+        np.testing.assert_allclose(tick.torque, torques[k + delay], atol=1e-9 * size)
+        account = controller.gate.tank
+        found = account.sigma, account.grip, account.level, account.reserve, account.lost
+        np.testing.assert_allclose(row[1:6], found, atol=1e-9)
+    if law == "energy_gated":
+        assert rows[:, 1].min() < 1.0 or rows[:, 3].min() > 0.01
+
+
+def held_by_ode(case: Case, torque: np.ndarray) -> tuple[np.ndarray, float]:
+    """A tick of point masses with their surroundings, and its heat, by an adaptive integrator."""
+    around, n = case.around, case.team.n
+    m = len(around.rest)
+    inertia = around.inertia.copy()
+    inertia[:n, :n] += np.diag(case.team.masses)
+
+    def rate(t: float, state: np.ndarray) -> np.ndarray:
+        z, z_rate = state[:m], state[m : 2 * m]
+        force = around.rest - around.stiffness @ z - around.damping @ z_rate
+        for b, k, gap in zip(
+            around.directions, around.contact_stiffness, around.gaps, strict=True
+        ):
+            force = force - k * max(b @ z - gap, 0.0) * b
+        force[:n] += torque
+        heat = z_rate @ around.damping @ z_rate
+        return np.concatenate([z_rate, np.linalg.solve(inertia, force), [heat]])
+
+    start = np.concatenate([*case.start, [0.0]])
+    end = solve_ivp(rate, (0.0, 1e-3), start, rtol=1e-12, atol=1e-13).y[:, -1]
+    return end[: 2 * m], float(end[-1])
+
+
+@pytest.mark.parametrize("index", [i for i in range(12) if i % cases.ARMS_EVERY != 4])
+def test_a_tick_of_the_plant_is_what_an_integrator_finds(index: int) -> None:
+    """Exact hold and midpoint rule move point masses as an adaptive method does."""
+    case = make_case(4, index, HALF_TICK)
+    torque = np.linspace(-3.0, 5.0, case.team.n)
+    z, z_rate = case.start[0].copy(), case.start[1].copy()
+    heat = plant.advance(plant_of(case, 1e-3), case.team, case.around, 1e-3, z, z_rate, torque)
+    wanted, wanted_heat = held_by_ode(case, torque)
+    bound = 1e-9 if case.linear else 2e-3
+    scale = np.abs(wanted).max()
+    np.testing.assert_allclose(np.concatenate([z, z_rate]), wanted, atol=bound * scale)
+    assert heat == pytest.approx(wanted_heat, rel=5e-2 if not case.linear else 1e-6, abs=1e-12)
+
+
+def door() -> Case:
+    """The example of the derivations: two robots on one door at different radii."""
+    mixing = cases.task_matrix(2, 1)
+    S = np.linalg.inv(mixing)
+    masses = np.array([1.0, 4.0])
+    own = np.diag(S.T @ np.diag(masses) @ S)
+    K = np.array([10.0, 1825.0])
+    D = 2.0 * np.array([0.84, 1.59]) * np.sqrt(K * own)
+    angle = np.deg2rad(114.26)
+    lever = Element("spring", np.array([np.cos(angle), np.sin(angle)]), 5e4)
+    around = assembled([lever], 2)
+    team = make_case(0, 0, HALF_TICK).team._replace(
+        mixing=mixing, S=S, masses=masses, stiffness=K, damping=D
+    )
+    return Case(0, team, around, [lever], np.array([[0.01, 0.01], [0.0, 0.0]]), 2, 1)
+
+
+def test_the_door_grows_as_stated_and_settles_when_gated() -> None:
+    """The noninteracting loop grows with 17.8 /s, a little less at 1 kHz; passive laws rest."""
+    case = door()
+    assert growth_rate(case, 1e-5, 0, 1.0, 1.0) == pytest.approx(17.76, abs=0.01)
+    assert growth_rate(case, 1e-3, 0, 1.0, 1.0) == pytest.approx(17.68, abs=0.01)
+    assert growth_rate(case, 1e-3, 0, 0.0, 1.0) < 0.0
+    found = {item.law: item for item in judge(case, GauntletSettings())}
+    assert found["noninteracting"].state == "unbounded"
+    assert found["noninteracting"].agreed
+    for law in ("natural", "energy_gated"):
+        assert found[law].settled
+        assert found[law].agreed
+    assert found["energy_gated"].sigma_least < 0.7
+
+
+def test_few_cases_pass_and_the_paper_does_not() -> None:
+    """Passive laws bring 60 cases to rest, residuals are rounding, verdicts agree."""
+    settings = GauntletSettings(cases=60, seed=1, jobs=1)
+    verdicts = run_cases(settings)
+    report = counted(settings, verdicts)
+    assert report.passed
+    names = {check.name for check in report.checks}
+    assert {"not at rest, energy_gated", "unbounded, natural", "residual, natural"} <= names
+    assert sum(item.unstable for item in verdicts if item.law == "noninteracting") >= 2
+    assert sum(item.agreed is True for item in verdicts) > 100
+    assert max(item.mismatch for item in verdicts if not item.unstable) < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("tank", "claim"),
+    [
+        (TankSettings(refill_fraction=2.0), "residual, energy_gated"),
+        (TankSettings(initial=1e6, capacity=1e6), "not at rest, energy_gated"),
+    ],
+)
+def test_a_broken_account_is_found_out(tank: TankSettings, claim: str) -> None:
+    """A refill of more than was absorbed shows in the residual; a purse without end in counts."""
+    settings = GauntletSettings(
+        cases=50, seed=1, jobs=1, laws=("energy_gated",), horizon=30.0, tank=tank
+    )
+    report = counted(settings, run_cases(settings))
+    assert claim in {check.name for check in report.checks if check.passed is False}
+
+
+def test_a_case_depends_on_its_number_alone() -> None:
+    """Case 17 of a seed is the same whatever else is drawn, and differs from seed to seed."""
+    first, again = make_case(5, 17, HALF_TICK), make_case(5, 17, HALF_TICK)
+    np.testing.assert_array_equal(first.start, again.start)
+    np.testing.assert_array_equal(first.team.stiffness, again.team.stiffness)
+    assert not np.array_equal(first.team.stiffness, make_case(6, 17, HALF_TICK).team.stiffness)
+
+
+@pytest.mark.parametrize("index", range(40))
+def test_surroundings_are_passive(index: int) -> None:
+    """Matrices of every element are symmetric and semidefinite, energies are not negative."""
+    around: SurroundingsArrays = make_case(3, index, HALF_TICK).around
+    for matrix in (around.inertia, around.stiffness, around.damping):
+        np.testing.assert_allclose(matrix, matrix.T)
+        assert np.linalg.eigvalsh(matrix).min() >= -1e-9 * max(1.0, np.abs(matrix).max())
+    least = around.preload - 0.5 * around.rest @ np.linalg.pinv(around.stiffness) @ around.rest
+    assert least >= -1e-9
+    assert (around.contact_stiffness > 0.0).all()
+    assert (around.gaps >= 0.0).all()
+
+
+def test_the_command_tells_one_case_in_full(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path
+) -> None:
+    """Case by number, as a table and as JSON in a file."""
+    file = tmp_path / "case.json"
+    arguments = ["check", "gauntlet", "--case", "3", "--seed", "1", "--json", str(file)]
+    monkeypatch.setattr("sys.argv", ["noninteract", *arguments])
+    assert cli.main() == 0
+    assert "course under energy_gated" in capsys.readouterr().out.lower()
+    told = json.loads(file.read_text())
+    assert [row["law"] for row in told["outcomes"]] == list(LAWS)
+
+
+def test_an_unknown_law_is_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The message names the option and what is allowed."""
+    monkeypatch.setattr("sys.argv", ["noninteract", "check", "gauntlet", "--law", "gated"])
+    assert cli.main() == 2
+    assert "energy_gated" in capsys.readouterr().err
