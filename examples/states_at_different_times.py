@@ -24,7 +24,7 @@ def late_eyes(rehearsal: Rehearsal, prediction: str, age: int) -> None:
     def seen(now, q, v, **more):
         told.append((round(1e9 * now), q, v))
         for joints, (stamp, position, velocity) in ((first, told[-1]), (second, told[0])):
-            assembler.take(joints, stamp, position[joints], velocity[joints])
+            assembler.update(joints, stamp, position[joints], velocity[joints])
         state = assembler.assemble()
         return step(now, state.position, state.velocity, **more)
 

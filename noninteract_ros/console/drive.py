@@ -80,7 +80,7 @@ class DrivenMotion:
     def __init__(self, subtask: Drivable, start: Array) -> None:
         self._subtask = subtask
         self._desired = DesiredMotion(subtask.limits, False, subtask.layout)
-        self._desired.rest_at(start)
+        self._desired.hold_at(start)
         self._words = LAST_WORDS
 
     @property

@@ -5,7 +5,7 @@ from typing import Any
 
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.simulation.environment import Wall
-from noninteract_ros.subtasks.kinds.edges import edge_pairs, edge_places
+from noninteract_ros.subtasks.kinds.edges import edge_indices, edge_pairs
 from noninteract_ros.team.team import Team
 
 
@@ -24,5 +24,5 @@ def edges(scenario: Scenario, team: Team) -> list[tuple[int, int]]:
     for name, spec in scenario.subtasks.items():
         given = getattr(spec.kind, "edges", None)
         if given is not None:
-            found += edge_places(edge_pairs(name, given, team), team)
+            found += edge_indices(edge_pairs(name, given, team), team)
     return sorted(set(found))

@@ -167,7 +167,7 @@ class TeamController:
 
     def _forget_inputs(self) -> None:
         for item in self.inputs.values():
-            item.forget()
+            item.discard_inputs()
 
     def _change(self, mode: Mode) -> None:
         self._law.left = self._law.left or self._mode
@@ -208,11 +208,10 @@ class TeamController:
             self.outside.reset()
             self.gate.pause()
         led = tuple(
-            item.resting(now) if stopped else item.advance(now, step)
-            for item in self.inputs.values()
+            item.hold(now) if stopped else item.advance(now, step) for item in self.inputs.values()
         )
         regular = self._guard.relative(seen.dynamics.inverse_sizes)
-        relative = min(regular, self.stack.soundness(seen.state))
+        relative = min(regular, self.stack.singularity_distance(seen.state))
         share = self._guard.law_share(relative)
         self.outside.see(step, q, v, applied)
         changing = self._law.changing(now) or self._springs.changing
@@ -297,7 +296,7 @@ class TeamController:
 
     def _rest_at(self, x: Array) -> None:
         for item, part in zip(self.inputs.values(), self.stack.value_slices, strict=True):
-            item.rest_at(x[part])
+            item.hold_at(x[part])
 
     def _error(self, seen: Evaluation, led: Sequence[SubtaskCommand]) -> TaskError:
         position = np.concatenate([item.reference.position for item in led])

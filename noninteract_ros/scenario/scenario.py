@@ -172,13 +172,13 @@ class Scenario:
             self.build_planner(stack)
 
     @property
-    def own_states(self) -> bool:
+    def has_robot_state_topics(self) -> bool:
         """Whether each robot tells its state on a topic of its own."""
-        return any(block.wiring.joint_states_topic for block in self.robots.values())
+        return any(block.topics.joint_states_topic for block in self.robots.values())
 
     def _check_topics(self) -> None:
         for name, block in self.robots.items():
-            if self.own_states and not block.wiring.joint_states_topic:
+            if self.has_robot_state_topics and not block.topics.joint_states_topic:
                 path, found = join(name, "joint_states_topic"), "nothing"
                 raise ScenarioError(path, found, "a topic for every robot, or for none")
 

@@ -24,7 +24,7 @@ from noninteract_ros.team.models.urdf_files import read_urdf, share_folders
 from noninteract_ros.team.models.urdf_robot import UrdfRobot
 from noninteract_ros.team.robot import Robot
 
-NOBODY = -1
+NO_ROBOT = -1
 STICK = 0.07  # radius of a link without geometry, as a share of the longest link
 PANEL = (0.02, 0.05)  # thickness and height of a door, as shares of its width
 FEW = 6  # balls that are drawn as round as can be
@@ -38,7 +38,7 @@ class Shape:
     Attributes:
         joint: Number of the joint in the plant's model; 0 is the world.
         hull: The body in the joint's frame.
-        owner: Number of the robot that it belongs to, or `NOBODY`.
+        owner: Number of the robot that it belongs to, or `NO_ROBOT`.
     """
 
     joint: int
@@ -67,7 +67,7 @@ def shapes_of(
         for joint, hull in parts or _sticks(robot):
             found.append(Shape(*_in_plant(plant, robot, joint, hull), number))
     found += [
-        Shape(joint, hull, NOBODY)
+        Shape(joint, hull, NO_ROBOT)
         for name, block in scenario.surroundings.items()
         for joint, hull in _body(name, block, plant)
     ]
@@ -78,7 +78,7 @@ def shapes_of(
 def _in_plant(plant: Plant, robot: Robot, joint: int, hull: Hull) -> tuple[int, Hull]:
     """A shape on a joint of a robot's own model, as one on a joint of the plant's."""
     if joint == 0:
-        return 0, hull.moved(robot.base_pose)
+        return 0, hull.transformed(robot.base_pose)
     return plant.model.getJointId(f"{robot.name}/{robot.model.names[joint]}"), hull
 
 
@@ -87,7 +87,7 @@ def _ball(block: PointMass, scenario: Scenario, radius: float) -> list[tuple[int
     masses = [item.mass for item in scenario.robots.values() if isinstance(item, PointMass)]
     share = 0.08 / np.sqrt(1.0 + 0.25 * len(masses))
     size = share * radius * (block.mass / max(masses)) ** (1.0 / 3.0)
-    return [(len(block.axes), hulls.ball(size, 60 if len(masses) <= FEW else 24))]
+    return [(len(block.axes), hulls.sphere(size, 60 if len(masses) <= FEW else 24))]
 
 
 def _collision_geometry(block: UrdfRobot, robot: Robot) -> Iterator[tuple[int, Hull]]:
@@ -103,12 +103,12 @@ def _collision_geometry(block: UrdfRobot, robot: Robot) -> Iterator[tuple[int, H
         link = full.frames[item.parentFrame]
         frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]
         try:
-            hull = hulls.hull_of_geometry(item.geometry)
+            hull = hulls.geometry_hull(item.geometry)
         except QhullError:  # A flat mesh.
             continue
         if hull is not None:
             place = frame.placement * link.placement.inverse() * item.placement
-            yield frame.parentJoint, hull.moved(place)
+            yield frame.parentJoint, hull.transformed(place)
 
 
 def _sticks(robot: Robot) -> list[tuple[int, Hull]]:
@@ -123,7 +123,7 @@ def _sticks(robot: Robot) -> list[tuple[int, Hull]]:
     longest = max(float(np.linalg.norm(end)) for _, end in ends)
     radius = STICK * (longest or 1.0)
     return [(0, hulls.cylinder(2.0 * radius, 2.0 * radius))] + [
-        (parent, hulls.stick(np.zeros(3), end, radius))
+        (parent, hulls.capsule(np.zeros(3), end, radius))
         for parent, end in ends
         if np.linalg.norm(end) > 0.01 * longest
     ]
@@ -147,4 +147,4 @@ def _body(name: str, block: object, plant: Plant) -> list[tuple[int, Hull]]:
     thickness, height = (share * width for share in PANEL)
     place = pin.SE3(np.column_stack((across, np.cross(axis, across), axis)), 0.55 * width * across)
     panel = hulls.box(np.array([1.1 * width, thickness, height]))
-    return [(plant.model.getJointId(f"{name}/hinge"), panel.moved(place))]
+    return [(plant.model.getJointId(f"{name}/hinge"), panel.transformed(place))]

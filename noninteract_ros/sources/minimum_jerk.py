@@ -52,17 +52,17 @@ class RestToRest:
         self._starts: Array = np.array(starts, dtype=np.float64)
         self._durations: Array = np.array(durations, dtype=np.float64)
         self._values: Array = np.array(values, dtype=np.float64)
-        self._layout = layout or Layout.numbers(self._values.shape[1])
+        self._layout = layout or Layout.scalars(self._values.shape[1])
 
     def __call__(self, t: float) -> Reference:
         """The motion at time `t` [s]."""
         move = int(np.searchsorted(self._starts, t, side="right")) - 1
         if move < 0:
-            return Reference.still(self._values[0], self._layout)
+            return Reference.at_rest(self._values[0], self._layout)
         duration = float(self._durations[move])
         value, rate, curvature = blend((t - float(self._starts[move])) / duration)
         if value == 1.0:
-            return Reference.still(self._values[move + 1], self._layout)
+            return Reference.at_rest(self._values[move + 1], self._layout)
         start = self._values[move]
         way = self._layout.difference(self._values[move + 1], start)
         # A rotation vector that keeps its direction changes as the angular velocity says.

@@ -78,7 +78,7 @@ class Layout:
         self._wound, self._wound_rates = self.values[wound], self.rates[wound]
 
     @classmethod
-    def numbers(cls, count: int) -> "Layout":
+    def scalars(cls, count: int) -> "Layout":
         """A value of plain numbers only."""
         return cls((count,), (False,))
 
@@ -146,7 +146,7 @@ class Layout:
         result[..., self.quaternions] = so3.normalized(turned)
         return result
 
-    def gap(self, motion: ValueMotion, base: ValueMotion) -> ValueMotion:
+    def relative_motion(self, motion: ValueMotion, base: ValueMotion) -> ValueMotion:
         """How a motion differs from another: the difference and its two exact derivatives."""
         linear = tuple(a - b for a, b in zip(motion[1:], base[1:], strict=True))
         rate, rate_rate = linear
@@ -163,7 +163,7 @@ class Layout:
             rate[part], rate_rate[part] = phi_rate, _times(A_inverse, growth - bend)
         return e, rate, rate_rate
 
-    def moved(self, base: ValueMotion, gap: ValueMotion) -> ValueMotion:
+    def compose_motion(self, base: ValueMotion, gap: ValueMotion) -> ValueMotion:
         """The motion that a gap leads away from another: undoes `gap`."""
         linear = tuple(a + b for a, b in zip(base[1:], gap[1:], strict=True))
         velocity, acceleration = linear
@@ -178,7 +178,7 @@ class Layout:
             acceleration[part] = growth + _times(so3.hat(turn), omega) + alpha
         return self.sum(base[0], gap[0]), velocity, acceleration
 
-    def ahead(self, motion: ValueMotion, dt: float) -> ValueMotion:
+    def extrapolate(self, motion: ValueMotion, dt: float) -> ValueMotion:
         """A motion `dt` seconds later, its acceleration held.
 
         Rotations turn on by exp(omega dt + alpha dt^2 / 2), with the exact derivatives of that.
@@ -194,9 +194,11 @@ class Layout:
                 acceleration,
             )
         still = np.zeros_like(velocity)
-        return self.moved((x, still, still), (way, velocity + dt * acceleration, acceleration))
+        return self.compose_motion(
+            (x, still, still), (way, velocity + dt * acceleration, acceleration)
+        )
 
-    def departure(
+    def deviation(
         self, motion: ValueMotion, before: ValueMotion, dt: float
     ) -> tuple[Array, Array]:
         """Difference and its rate between a motion and where another one led `dt` s later.
@@ -204,7 +206,7 @@ class Layout:
         They are the first two of `gap` from `ahead`, without the work for the third.
         """
         if not self.rotates:
-            return self.gap(motion, self.ahead(before, dt))[:2]
+            return self.relative_motion(motion, self.extrapolate(before, dt))[:2]
         x, velocity, acceleration = before
         way = dt * velocity + (0.5 * dt * dt) * acceleration
         led, part = velocity + dt * acceleration, self.angular
@@ -215,7 +217,7 @@ class Layout:
         rate[part] = _times(so3.inverse_jacobian(e[part]), turn)
         return e, rate
 
-    def merged(self, plain: Array, turns: Array) -> Array:
+    def stack_components(self, plain: Array, turns: Array) -> Array:
         """Velocity or gap, shape (dim,), of its plain numbers and its rotation vectors."""
         result = np.empty(self.dim)
         result[self.rates], result[self.angular] = plain, turns.reshape(-1, 3)

@@ -27,27 +27,27 @@ class Reference:
     acceleration: Array
 
     @classmethod
-    def still(cls, position: ArrayLike, layout: Layout | None = None) -> "Reference":
+    def at_rest(cls, position: ArrayLike, layout: Layout | None = None) -> "Reference":
         """Rest at a position of shape (size,), which is copied."""
         held = np.array(position, dtype=np.float64)
         dim = held.size if layout is None else layout.dim
         return cls(held, np.zeros(dim), np.zeros(dim))
 
-    def at(self, dt: float, layout: Layout | None = None) -> "Reference":
+    def extrapolate(self, dt: float, layout: Layout | None = None) -> "Reference":
         """The same motion `dt` seconds later, its acceleration held."""
-        return Reference(*(layout or self._plain).ahead(self._motion, dt))
+        return Reference(*(layout or self._plain).extrapolate(self._motion, dt))
 
     def minus(self, base: "Reference", layout: Layout) -> "Reference":
         """The gap from another motion to this one, all of it of shape (dim,)."""
-        return Reference(*layout.gap(self._motion, base._motion))
+        return Reference(*layout.relative_motion(self._motion, base._motion))
 
-    def departure(self, before: "Reference", dt: float, layout: Layout) -> tuple[Array, Array]:
+    def deviation(self, before: "Reference", dt: float, layout: Layout) -> tuple[Array, Array]:
         """Position and velocity of `self.minus(before.at(dt))`, shape (dim,) each."""
-        return layout.departure(self._motion, before._motion, dt)
+        return layout.deviation(self._motion, before._motion, dt)
 
     def plus(self, gap: "Reference", layout: Layout) -> "Reference":
         """The motion that a gap, all of it of shape (dim,), leads away from this one."""
-        return Reference(*layout.moved(self._motion, gap._motion))
+        return Reference(*layout.compose_motion(self._motion, gap._motion))
 
     @property
     def _motion(self) -> ValueMotion:
@@ -55,4 +55,4 @@ class Reference:
 
     @property
     def _plain(self) -> Layout:
-        return Layout.numbers(self.position.size)
+        return Layout.scalars(self.position.size)

@@ -43,7 +43,9 @@ class SubtaskStack:
         self.value_slices = _slices([subtask.size for subtask in subtasks])
         self._stacked, self._stacked_rate = Memo(_stack), Memo(_stack)
         self._bounded = [
-            task for task in self.subtasks if type(task).soundness is not Subtask.soundness
+            task
+            for task in self.subtasks
+            if type(task).singularity_distance is not Subtask.singularity_distance
         ]
         self._check_rank(team)
 
@@ -56,9 +58,9 @@ class SubtaskStack:
             self._stacked_rate(*(part.J_rate for part in parts)),
         )
 
-    def soundness(self, state: TeamState) -> float:
-        """Least `Subtask.soundness` of all, 1 where none has places without a value."""
-        return min((task.soundness(state) for task in self._bounded), default=1.0)
+    def singularity_distance(self, state: TeamState) -> float:
+        """Least `Subtask.singularity_distance` of all, 1 where none has places without a value."""
+        return min((task.singularity_distance(state) for task in self._bounded), default=1.0)
 
     def difference(self, x: Array, x_d: Array) -> Array:
         """Error of stacked values towards others, shape (n,); see `Layout.difference`."""

@@ -107,7 +107,7 @@ class Subtask(ABC):
     def evaluate(self, state: TeamState) -> SubtaskState:
         """Value, Jacobian and Jacobian rate at a state of the team."""
 
-    def soundness(self, state: TeamState) -> float:
+    def singularity_distance(self, state: TeamState) -> float:
         """How far the state is from places where the value is not defined: there 0, at most 1.
 
         A Jacobian that grows beyond bounds there hides from the regularity of the stack; so the

@@ -45,14 +45,14 @@ class JointSettings(RobotTopics):
         "Inertia of the rotor, seen at the joint [kg or kg m^2]; by default none", (), minimum=0.0
     )
 
-    def equip(self, name: str, model: pin.Model) -> None:
+    def apply_to(self, name: str, model: pin.Model) -> None:
         """Puts what is given into a robot's model.
 
         Raises:
             ScenarioError: A list has another length, a limit does not fit, or a joint moves no
                 mass, or its topics do not fit.
         """
-        self.check_wiring(name, joint_names(model))
+        self.check_topics(name, joint_names(model))
         nothing = np.zeros(model.nv)
         model.damping = self._spread(name, model, "friction", nothing)
         model.armature = self._spread(name, model, "armature", nothing)

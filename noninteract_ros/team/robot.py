@@ -40,12 +40,12 @@ class Robot:
     @property
     def effort_limits(self) -> Array:
         """Largest torque of each joint, shape (nv,) [N or N m]; inf where there is none."""
-        return without_bound(self.model.upperEffortLimit)
+        return unlimited_as_inf(self.model.upperEffortLimit)
 
     @property
     def velocity_limits(self) -> Array:
         """Largest speed of each joint, shape (nv,) [m/s or rad/s]; inf where there is none."""
-        return without_bound(self.model.upperVelocityLimit)
+        return unlimited_as_inf(self.model.upperVelocityLimit)
 
     @property
     def position_limits(self) -> Array:
@@ -60,10 +60,10 @@ def position_limits(model: pin.Model) -> Array:
         if joint.nq == 1:  # A continuous joint has none.
             limits[0, joint.idx_v] = model.lowerPositionLimit[joint.idx_q]
             limits[1, joint.idx_v] = model.upperPositionLimit[joint.idx_q]
-    return without_bound(limits)
+    return unlimited_as_inf(limits)
 
 
-def without_bound(limits: Array) -> Array:
+def unlimited_as_inf(limits: Array) -> Array:
     """Limits with infinity where Pinocchio means none by the largest number."""
     largest = np.finfo(float).max
     return np.where(np.abs(limits) >= largest, np.copysign(np.inf, limits), limits)

@@ -38,7 +38,7 @@ class RobotTopics:
     )
 
     @property
-    def wiring(self) -> "RobotTopics":
+    def topics(self) -> "RobotTopics":
         """These keys, of a block that has others too."""
         return self
 
@@ -51,7 +51,7 @@ class RobotTopics:
         known = self.driver_joints(joints)
         return [known.index(joint) for joint in self.effort_joints or known]
 
-    def check_wiring(self, name: str, joints: Sequence[str]) -> None:
+    def check_topics(self, name: str, joints: Sequence[str]) -> None:
         """Checks the keys against the joints of a model.
 
         Raises:

@@ -61,7 +61,7 @@ class StateAssembler:
         self._effort = np.full(count, np.nan)
         self._fresh = np.zeros(count, dtype=bool)
 
-    def take(
+    def update(
         self,
         joints: NDArray[np.intp],
         stamp_ns: int,
@@ -89,18 +89,18 @@ class StateAssembler:
         self._stamps[joints] = stamp_ns
         self._fresh[joints] = True
 
-    def forget(self, joints: NDArray[np.intp]) -> None:
+    def reset(self, joints: NDArray[np.intp]) -> None:
         """Forgets joints whose clock starts anew."""
         self._stamps[joints], self._fresh[joints] = -1, False
         self._a[joints] = 0.0
 
     @property
-    def unheard(self) -> list[str]:
+    def missing(self) -> list[str]:
         """Joints of which nothing was told so far."""
         return [self.names[joint] for joint in np.flatnonzero(self._stamps < 0)]
 
     @property
-    def fresh(self) -> bool:
+    def ready(self) -> bool:
         """Whether every joint is known, and something was told since the last assembly."""
         return bool(self._fresh.any() and self._stamps.min() >= 0)
 

@@ -25,7 +25,7 @@ def swaying(t: float) -> Reference:
     size, w = SWAYS
     gap = size * np.sin(w * t), w * size * np.cos(w * t), -w * w * size * np.sin(w * t)
     centre = np.concatenate([[0.3, -0.2, 0.5], so3.exp(np.array([0.3, -0.4, 0.2]))])
-    return Reference.still(centre, POSE).plus(Reference(*gap), POSE)
+    return Reference.at_rest(centre, POSE).plus(Reference(*gap), POSE)
 
 
 def aim(_: float) -> Target:
@@ -47,7 +47,7 @@ def left(velocity: np.ndarray, acceleration: np.ndarray) -> DesiredMotion:
     The source goes steadily for a while, until it is followed exactly, and accelerates at last.
     """
     value = np.concatenate([[0.4, 0.1, 0.2], so3.exp(np.array([0.5, 0.1, -0.3]))])
-    end, v, a = Reference.still(value, POSE), velocity, acceleration
+    end, v, a = Reference.at_rest(value, POSE), velocity, acceleration
 
     def source(t: float) -> Reference:
         s = max(t, -PUSH)
@@ -57,7 +57,7 @@ def left(velocity: np.ndarray, acceleration: np.ndarray) -> DesiredMotion:
 
     count = round(1.2 / STEP)
     desired = DesiredMotion(BOUNDS, False, POSE)
-    desired.rest_at(source(-count * STEP).position)
+    desired.hold_at(source(-count * STEP).position)
     for k in range(1 - count, 1):
         desired.advance(source(k * STEP), STEP)
     np.testing.assert_allclose(desired.now.acceleration, acceleration, rtol=1e-9)

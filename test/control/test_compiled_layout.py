@@ -30,7 +30,7 @@ def test_both_find_the_same(name, size, dt):
     for _ in range(5):
         here, before = motion(layout, rng, size), motion(layout, rng, size)
         found, wanted = (
-            (item.difference(here[0], before[0]), *item.departure(here, before, dt))
+            (item.difference(here[0], before[0]), *item.deviation(here, before, dt))
             for item in (CompiledLayout(layout), layout)
         )
         for one, other in zip(found, wanted, strict=True):

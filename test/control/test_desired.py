@@ -15,7 +15,7 @@ START = np.array([0.3, -0.2])
 
 def motion(direct: bool = False) -> DesiredMotion:
     desired = DesiredMotion(LIMITS, direct)
-    desired.rest_at(START)
+    desired.hold_at(START)
     return desired
 
 
@@ -124,7 +124,7 @@ def test_shaped_take_over_starts_where_the_motion_is_and_ends_on_the_reference()
     """A full reference far away is joined from rest without a jump, then followed exactly."""
     desired = motion()
     way = run(desired, swing, 6.0)
-    assert_joins(Reference.still(START), way)
+    assert_joins(Reference.at_rest(START), way)
     for item, k in zip(way[-100:], range(5901, 6001), strict=True):
         np.testing.assert_array_equal(item.position, swing(k * STEP).position)
         np.testing.assert_array_equal(item.velocity, swing(k * STEP).velocity)
@@ -166,7 +166,7 @@ def test_slow_references_that_are_extrapolated_are_no_jumps():
     for k in range(1, 1001):
         t = 6.0 + k * STEP
         spoken = np.floor(t * 100.0 + 1e-9) / 100.0
-        item = desired.advance(swing(spoken).at(t - spoken), STEP)
+        item = desired.advance(swing(spoken).extrapolate(t - spoken), STEP)
         worst = max(worst, np.abs(item.position - swing(t).position).max())
     assert worst < 1e-6
 
@@ -230,6 +230,6 @@ def test_rest_keeps_its_own_copy():
     """The place of rest does not follow the array it was given in."""
     place = START.copy()
     desired = DesiredMotion(LIMITS, False)
-    desired.rest_at(place)
+    desired.hold_at(place)
     place += 1.0
     np.testing.assert_array_equal(desired.advance(None, STEP).position, START)

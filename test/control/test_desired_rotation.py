@@ -24,7 +24,7 @@ def value(*phi: float) -> np.ndarray:
 
 def motion(direct: bool = False) -> DesiredMotion:
     desired = DesiredMotion(LIMITS, direct, POSE)
-    desired.rest_at(value(0.1, 0.2, 0.3))
+    desired.hold_at(value(0.1, 0.2, 0.3))
     return desired
 
 
@@ -32,7 +32,7 @@ def turning(t: float) -> Reference:
     """A full reference that is always on the move, about no fixed axis."""
     phase = 1.2 * t + np.arange(5.0)
     gap = 0.4 * np.sin(phase), 0.48 * np.cos(phase), -0.576 * np.sin(phase)
-    return Reference.still(value(*TURN), POSE).plus(Reference(*gap), POSE)
+    return Reference.at_rest(value(*TURN), POSE).plus(Reference(*gap), POSE)
 
 
 def run(desired: DesiredMotion, asked, seconds: float, start: float = 0.0) -> list[Reference]:
@@ -122,7 +122,7 @@ def test_references_that_are_extrapolated_are_no_jumps():
 
     def held(t: float) -> Reference:
         last = np.floor(t / 0.01 + 1e-9) * 0.01
-        return turning(last).at(t - last, layout)
+        return turning(last).extrapolate(t - last, layout)
 
     run(desired, held, 3.0)
     way = run(desired, held, 0.2, start=3.0)

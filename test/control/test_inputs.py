@@ -64,14 +64,14 @@ def test_forces_and_motions_do_not_displace_each_other():
 
 
 def test_markers_and_motions_say_how_far_the_source_has_spoken():
-    """`heard_until` is the latest stamp of a motion or marker; it never goes back."""
+    """`complete_until` is the latest stamp of a motion or marker; it never goes back."""
     source = Source()
-    assert source.heard_until == -np.inf
+    assert source.complete_until == -np.inf
     source.receive(1.0, rate(1.0), now=1.0)
-    source.silent_until(3.0)
-    source.silent_until(2.0)
+    source.mark_complete_until(3.0)
+    source.mark_complete_until(2.0)
     source.receive(1.5, rate(1.0), now=1.0)
-    assert source.heard_until == 3.0
+    assert source.complete_until == 3.0
 
 
 def test_forget_drops_what_came_but_not_how_far_it_was_spoken():
@@ -80,9 +80,9 @@ def test_forget_drops_what_came_but_not_how_far_it_was_spoken():
     source.receive(1.0, rate(1.0), now=1.0)
     source.receive(1.0, Force(np.array([3.0])), now=1.0)
     source.motion(1.0)
-    source.forget()
+    source.discard_inputs()
     assert source.motion(9.0) is None
     assert source.force(9.0) is None
-    assert source.heard_until == 1.0
+    assert source.complete_until == 1.0
     source.receive(0.5, rate(2.0), now=1.0)
     assert source.motion(1.0)[1].velocity == 2.0

@@ -210,7 +210,9 @@ class Motion:
         self.q = case.team.q0
         self.v = 0.2 * rng.normal(size=n)
         layout = case.stack.layout
-        self.base = Reference.still(case.stack.evaluate(case.team.state(self.q, self.v)).x, layout)
+        self.base = Reference.at_rest(
+            case.stack.evaluate(case.team.state(self.q, self.v)).x, layout
+        )
 
     def reference(self, t: float) -> Reference:
         phase = 2.0 * t + np.arange(self.case.team.n)

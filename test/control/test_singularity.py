@@ -69,7 +69,7 @@ class Loop:
         now = self.simulation.now
         if target is not None:
             source = self.controller.inputs["cooperative"].sources["human"]
-            source.receive(now, Reference.still(target), now)
+            source.receive(now, Reference.at_rest(target), now)
         found = self.controller.step(now, self.simulation.q, self.simulation.v)
         self.simulation.step(found.torque)
         return found
@@ -135,7 +135,7 @@ def through_a_singularity(law: str, step: float) -> tuple[np.ndarray, np.ndarray
         q, now = core.team.q0.copy(), k * STEP
         q[1] = bend
         source = core.inputs["cooperative"].sources["human"]
-        source.receive(now, Reference.still(np.array([0.1, 0.8])), now)
+        source.receive(now, Reference.at_rest(np.array([0.1, 0.8])), now)
         tick = core.step(now, q, np.array([0.0, 0.5, 0.0, 0.0]))
         assert not tick.restarted or k == 0
         torques.append(tick.torque)

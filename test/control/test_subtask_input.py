@@ -17,7 +17,7 @@ START = np.array([0.1, 0.2])
 
 def led_by(authority: str, **keys) -> SubtaskInput:
     item = SubtaskInput(TASK, InputSettings(authority, **keys))
-    item.rest_at(START)
+    item.hold_at(START)
     return item
 
 
@@ -41,7 +41,7 @@ def test_a_source_without_authority_changes_nothing_at_all():
         elif kind == 2:
             noise.receive(now, Rate(np.full(2, 3.0)), now)
         else:
-            noise.receive(now, Reference.still([5.0, 5.0]), now)
+            noise.receive(now, Reference.at_rest([5.0, 5.0]), now)
         a, b = alone.advance(now, STEP), disturbed.advance(now, STEP)
         np.testing.assert_array_equal(a.reference.position, b.reference.position)
         np.testing.assert_array_equal(a.reference.acceleration, b.reference.acceleration)
@@ -89,10 +89,10 @@ def test_silence_leaves_the_subtask_at_rest_and_says_so(takeover):
 def test_fresh_input_after_silence_takes_over_without_a_jump():
     """A source that speaks again far away is joined from where the subtask rests."""
     item = led_by("human", timeout=0.05)
-    item.sources["human"].receive(0.0, Reference.still([0.5, 0.2]), 0.0)
+    item.sources["human"].receive(0.0, Reference.at_rest([0.5, 0.2]), 0.0)
     ticks(item, 1, 500)
     rest = item.advance(0.5, STEP).reference.position
-    item.sources["human"].receive(0.501, Reference.still([2.0, 2.0]), 0.5)
+    item.sources["human"].receive(0.501, Reference.at_rest([2.0, 2.0]), 0.5)
     led = item.advance(0.501, STEP)
     assert not led.silent
     np.testing.assert_allclose(led.reference.position, rest, atol=1e-6)
@@ -105,8 +105,8 @@ def test_change_of_authority_has_no_jump():
     last = None
     for k in range(3000):
         now = k * STEP
-        item.sources["human"].receive(now, Reference.still([1.0, 0.0]), now)
-        item.sources["autonomy"].receive(now, Reference.still([-1.0, 0.5]), now)
+        item.sources["human"].receive(now, Reference.at_rest([1.0, 0.0]), now)
+        item.sources["autonomy"].receive(now, Reference.at_rest([-1.0, 0.5]), now)
         item.authority = ("human", "autonomy")[(k // 700) % 2]
         led = item.advance(now, STEP)
         if last is not None:

@@ -365,7 +365,7 @@ def test_reset_forgets_the_past():
     assert tick.restarted == "the first state"
     assert all(item.silent for item in tick.led)
     sources = loop.controller.inputs["cooperative"].sources.values()
-    assert all(source.heard_until == -np.inf for source in sources)
+    assert all(source.complete_until == -np.inf for source in sources)
 
 
 def test_gains_that_do_not_fit_are_refused_and_nothing_changes():

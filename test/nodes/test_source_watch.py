@@ -29,7 +29,7 @@ def test_a_first_word_for_this_tick_and_all_that_follow_are_believed() -> None:
     found, source = watch()
     assert found.begins_ahead(NAME, 0.001, 0.0)
     assert not found.begins_ahead(NAME, 0.0, 0.0)
-    source.silent_until(0.0)
+    source.mark_complete_until(0.0)
     assert not found.begins_ahead(NAME, 0.001, 0.0)
     assert not found.begins_ahead(NAME, 0.002, 0.0)
 

@@ -21,7 +21,7 @@ from noninteract_ros.reporting.rendering.rendering import (
 from noninteract_ros.reporting.rendering.scene import Scene
 from noninteract_ros.scenario.files import find_scenario, nest, read_parameters
 from noninteract_ros.scenario.rehearsal import Rehearsal
-from noninteract_ros.scenario.shapes import NOBODY
+from noninteract_ros.scenario.shapes import NO_ROBOT
 from noninteract_ros.team.geometry import hulls
 
 URDF = """<robot name="two">
@@ -96,7 +96,7 @@ def test_what_is_held_is_drawn_where_the_simulation_had_it(carried: Recorded) ->
             drawn, true = scene.moment(row).q, rehearsal.simulation.plant_q
             np.testing.assert_allclose(drawn[: carried.team.n], true[: carried.team.n], atol=1e-12)
             plates = [
-                next(h for owner, h in scene.hulls(q) if owner == NOBODY) for q in (drawn, true)
+                next(h for owner, h in scene.hulls(q) if owner == NO_ROBOT) for q in (drawn, true)
             ]
             # It sets out without strain, above where it rests by m g / 3 k, which is 2.18 mm.
             assert np.abs(plates[0].points - plates[1].points).max() < 2.2e-3
@@ -203,11 +203,11 @@ def test_hulls_are_closed_and_look_outward() -> None:
     turned = pin.SE3(pin.utils.rotate("x", 0.7), np.array([0.3, -0.2, 1.0]))
     for hull, volume in (
         (hulls.box(np.array([0.2, 0.4, 0.6])), 0.048),
-        (hulls.ball(0.5, 4000), 4 / 3 * np.pi * 0.125),
+        (hulls.sphere(0.5, 4000), 4 / 3 * np.pi * 0.125),
         (hulls.cylinder(0.1, 0.5), 0.005 * np.pi),
-        (hulls.stick(np.zeros(3), np.array([0.0, 0.4, 0.0]), 0.1), 0.004 * np.pi * (1 + 1 / 3)),
+        (hulls.capsule(np.zeros(3), np.array([0.0, 0.4, 0.0]), 0.1), 0.004 * np.pi * (1 + 1 / 3)),
     ):
-        for body in (hull, hull.moved(turned), hull.refined(0.05)):
+        for body in (hull, hull.transformed(turned), hull.refined(0.05)):
             a, b, c = body.corners.transpose(1, 0, 2)
             found = (np.cross(a, b) * c).sum() / 6.0
             assert found == pytest.approx(volume, rel=0.12)
@@ -226,8 +226,8 @@ def test_edges_of_a_box_stay_sharp() -> None:
 def test_what_is_near_hides_what_is_far() -> None:
     """Whatever the order in which they are given."""
     camera = Camera.towards(np.zeros(3), 1.0, -90.0, 0.0)
-    near = "#FF0000", hulls.ball(0.2).moved(pin.SE3(np.eye(3), np.array([0.0, -1.0, 0.0])))
-    far = "#0000FF", hulls.ball(0.6)
+    near = "#FF0000", hulls.sphere(0.2).transformed(pin.SE3(np.eye(3), np.array([0.0, -1.0, 0.0])))
+    far = "#0000FF", hulls.sphere(0.6)
     for bodies in ([near, far], [far, near]):
         axes = Figure().add_subplot()
         paint(axes, camera, bodies)

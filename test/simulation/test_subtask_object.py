@@ -47,7 +47,7 @@ def simulate(rate: float, sign: str) -> np.ndarray:
         now = simulation.now
         sources = [item.sources for item in controller.inputs.values()]
         sources[0]["human"].receive(now, human(now), now)
-        sources[1]["autonomy"].receive(now, Reference.still([1.0, 1.0]), now)
+        sources[1]["autonomy"].receive(now, Reference.at_rest([1.0, 1.0]), now)
         tick = controller.step(now, simulation.q, simulation.v)
         values.append(tick.task.x)
         simulation.step(tick.torque)

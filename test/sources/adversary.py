@@ -77,7 +77,7 @@ class Loop:
         self._layout, self._hand, self._period = layout, hand, period
         self._there, self._back = network
         self._rng = np.random.default_rng(5)
-        self._motion = Reference.still(layout.identity, layout)
+        self._motion = Reference.at_rest(layout.identity, layout)
         self.device = ends[0](settings, metric, period)
         self.team = ends[1](settings, layout, metric, period, self._motion)
         self._root = np.sqrt(metric)

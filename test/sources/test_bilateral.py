@@ -13,7 +13,7 @@ from noninteract_ros.sources.link.bilateral import BilateralLink
 from noninteract_ros.sources.link.settings import LinkSettings
 from noninteract_ros.subtasks.layout import Layout
 
-PLANE = Layout.numbers(2)
+PLANE = Layout.scalars(2)
 POSE = Layout((3,), (True,))
 HAND: dict[str, Any] = {"motion": "circle", "centre": [0.0, 0.0], "hand_mass": 0.5}
 POSE_HAND: dict[str, Any] = {

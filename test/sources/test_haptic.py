@@ -18,7 +18,7 @@ PUSH = np.array([5.0, -2.0])
 
 def device(dim=2, **values):
     """A device as a scenario file gives it."""
-    return HapticDevice(load(HapticSettings, values, "haptic"), Layout.numbers(dim))
+    return HapticDevice(load(HapticSettings, values, "haptic"), Layout.scalars(dim))
 
 
 def test_the_papers_operator_needs_only_its_start():

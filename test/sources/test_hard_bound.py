@@ -18,7 +18,7 @@ from noninteract_ros.sources.port import affordable, without_excess
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.reference import Reference
 
-PLANE, POSE = Layout.numbers(2), Layout((3,), (True,))
+PLANE, POSE = Layout.scalars(2), Layout((3,), (True,))
 TICKS = 2000
 ROUNDING = 1e-9  # [J]
 HANDS: dict[str, Callable[[int], Hand]] = {
@@ -175,5 +175,5 @@ def test_a_device_that_can_do_less_does_not_drive_with_what_is_left() -> None:
     force = device.force(velocity)
     assert abs(force[1]) <= 0.1
     assert force @ velocity <= 1e-12
-    device.moved(force, 1e-3 * velocity, Reference.still(np.zeros(2)))
+    device.moved(force, 1e-3 * velocity, Reference.at_rest(np.zeros(2)))
     assert device.port.given <= 1e-15

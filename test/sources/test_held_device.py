@@ -17,7 +17,7 @@ STILL = {"motion": "still", "centre": [0.0, 0.0]}
 
 def device(**values: Any) -> HapticDevice:
     """A device as a scenario file gives it."""
-    return HapticDevice(load(HapticSettings, GRIP | values, "haptic"), Layout.numbers(2))
+    return HapticDevice(load(HapticSettings, GRIP | values, "haptic"), Layout.scalars(2))
 
 
 def settled(found: HapticDevice, force: list[float], ticks: int = 2000) -> np.ndarray:

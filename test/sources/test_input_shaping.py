@@ -100,12 +100,12 @@ def test_deflections_are_zero_in_the_dead_zone_continuous_and_odd() -> None:
 def test_sticks_become_rates_of_the_coordinates_that_there_are() -> None:
     """A planar subtask takes x and y; a pose all, with the angular ones in their places."""
     stick = np.array([1.0, -0.5, 0.25, 0.1, 0.2, 1.0])
-    flat = operator_input(planar(), linear_speed=0.2).rate(stick, Reference.still(np.zeros(2)))
+    flat = operator_input(planar(), linear_speed=0.2).rate(stick, Reference.at_rest(np.zeros(2)))
     np.testing.assert_allclose(flat, [0.2, -0.1])
     task = Pose()
     found = operator_input(task, linear_speed=0.2, angular_speed=0.5)
     np.testing.assert_allclose(
-        found.rate(stick, Reference.still(task.layout.identity, task.layout)),
+        found.rate(stick, Reference.at_rest(task.layout.identity, task.layout)),
         [0.2, -0.1, 0.05, 0.05, 0.1, 0.5],
     )
 
@@ -117,7 +117,7 @@ def test_nobody_leads_out_of_the_workspace() -> None:
         task, linear_speed=1.0, workspace=[1.0, 0.4], workspace_centre=[0.2, 0.0]
     )
     desired = DesiredMotion(limits(task), False, task.layout)
-    desired.rest_at(np.array([-0.2, 0.1]))
+    desired.hold_at(np.array([-0.2, 0.1]))
     stick = np.array([1.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     furthest = np.full(2, -np.inf)
     rate = np.zeros(2)
@@ -130,7 +130,7 @@ def test_nobody_leads_out_of_the_workspace() -> None:
         furthest = np.maximum(furthest, now.position * [1.0, -1.0])
     np.testing.assert_allclose(furthest, [0.7, 0.2], atol=2e-3)
     assert (furthest < [0.7005, 0.2005]).all()
-    outside = Reference.still([0.9, 0.0])
+    outside = Reference.at_rest([0.9, 0.0])
     assert found.rate(stick, outside)[0] == 0.0
     assert found.rate(-stick, outside)[0] < 0.0  # Back is always allowed.
 
@@ -172,7 +172,7 @@ def test_taking_over_letting_go_and_taking_hold_again_never_jump() -> None:
     bounds = limits(task, 0.6)
     found = operator_input(task, linear_scale=1.5)
     desired = DesiredMotion(bounds, False, task.layout)
-    desired.rest_at(task.layout.identity)
+    desired.hold_at(task.layout.identity)
     rng = np.random.default_rng(5)
     device, held = pose(0.0, 0.0, 0.0), False
     trace: list[Reference] = []

@@ -23,7 +23,7 @@ MOTIONS = {
     "waypoints": motions.waypoints(TIMES, POINTS),
     "replay": replay(RECORDED, np.stack([np.sin(RECORDED), np.cos(2 * RECORDED)], axis=1)),
     "still": motions.still([3.0]),
-    "tremor": motions.with_tremor(SWING, 0.01, seed=3, layout=Layout.numbers(2)),
+    "tremor": motions.with_tremor(SWING, 0.01, seed=3, layout=Layout.scalars(2)),
     "delayed": motions.delayed(SWING, 0.7),
 }
 
@@ -123,7 +123,7 @@ def test_a_single_value_is_held():
 def test_tremor_is_bounded_and_in_its_band():
     """The tremor stays below its amplitude and has no power outside 8 to 12 Hz."""
     trembling = motions.with_tremor(
-        motions.still([0.0, 0.0]), 0.01, seed=5, layout=Layout.numbers(2)
+        motions.still([0.0, 0.0]), 0.01, seed=5, layout=Layout.scalars(2)
     )
     samples = np.array([trembling(t).position for t in np.arange(0.0, 20.0, 0.01)])
     assert np.abs(samples).max() <= 0.01
@@ -136,7 +136,7 @@ def test_tremor_is_bounded_and_in_its_band():
 def test_tremor_is_settled_by_its_seed():
     """The same seed trembles alike to the bit, another differently, and no axis like the other."""
     first, again, other = (
-        motions.with_tremor(motions.still([0.0, 0.0]), 0.01, seed, Layout.numbers(2))(
+        motions.with_tremor(motions.still([0.0, 0.0]), 0.01, seed, Layout.scalars(2))(
             1.234
         ).position
         for seed in (7, 7, 8)

@@ -18,7 +18,7 @@ def planner(*formations, dim=2, rate=100.0):
     """A planner of formations that are named a, b, c and so on."""
     named = dict(zip("abcdef", formations, strict=False))
     settings = PlannerSettings(update_rate=rate, formations=tuple(named))
-    return FormationPlanner(settings, named, Layout.numbers(dim))
+    return FormationPlanner(settings, named, Layout.scalars(dim))
 
 
 def test_the_papers_formation_is_held_for_good():
@@ -95,11 +95,11 @@ def test_formations_that_do_not_fit_are_refused_by_key(formations, message):
 def test_a_listed_formation_needs_a_block():
     """A name without a block is missing, by its key."""
     with pytest.raises(ScenarioError, match=r"planner\.pair: found nothing"):
-        FormationPlanner(PlannerSettings(formations=("pair",)), {}, Layout.numbers(2))
+        FormationPlanner(PlannerSettings(formations=("pair",)), {}, Layout.scalars(2))
 
 
 def test_a_name_listed_twice_is_refused():
     """A formation has one time, so it cannot be taken twice."""
     named = {"a": Formation(WIDE), "b": Formation(NARROW, 1.0, 1.0)}
     with pytest.raises(ScenarioError, match=r"planner\.b\.time"):
-        FormationPlanner(PlannerSettings(formations=("a", "b", "b")), named, Layout.numbers(2))
+        FormationPlanner(PlannerSettings(formations=("a", "b", "b")), named, Layout.scalars(2))

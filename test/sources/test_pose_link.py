@@ -107,7 +107,7 @@ def test_the_scale_of_the_force_scales_what_is_felt_and_counted(scale: float) ->
 
     def net(force: float, **link: float) -> float:
         keys = {"motion": "circle", "centre": [0.0, 0.0], "hand_mass": 0.5}
-        settings, layout = load(HapticSettings, keys, "haptic"), Layout.numbers(2)
+        settings, layout = load(HapticSettings, keys, "haptic"), Layout.scalars(2)
         found = BilateralLink(
             HapticDevice(settings, layout), settings, load(LinkSettings, link, "link"), layout
         )

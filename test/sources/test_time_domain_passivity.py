@@ -81,7 +81,7 @@ class Adversary:
         metric = np.ones(layout.dim)
         self._rng = np.random.default_rng(seed)
         self._layout = layout
-        start = Reference.still(layout.identity, layout)
+        start = Reference.at_rest(layout.identity, layout)
         self.device = ObservedDevice(settings, metric, PERIOD)
         self.team = ObservedTeam(settings, layout, metric, PERIOD, start)
         self._there: Channel[Packet] = Channel(settings, 0)
@@ -124,7 +124,7 @@ LINKS = [
 ]
 
 
-@pytest.mark.parametrize("layout", [Layout.numbers(2), POSE], ids=["plane", "pose"])
+@pytest.mark.parametrize("layout", [Layout.scalars(2), POSE], ids=["plane", "pose"])
 @pytest.mark.parametrize("settings", LINKS)
 def test_nobody_gets_more_out_than_was_put_in_whatever_hand_and_team_do(
     settings: LinkSettings, layout: Layout
@@ -146,7 +146,7 @@ def test_nobody_gets_more_out_than_was_put_in_whatever_hand_and_team_do(
 def test_without_passivity_the_same_adversary_draws_what_it_likes() -> None:
     """The bound above is the observers' doing."""
     settings = LinkSettings(delay=0.2, jitter=0.3, loss=0.05, seed=2, passivity="none")
-    adversary = Adversary(settings, Layout.numbers(2), 7)
+    adversary = Adversary(settings, Layout.scalars(2), 7)
     adversary.run(6000)
     assert adversary.least < -10.0 * settings.reserve
 
@@ -155,7 +155,7 @@ def test_with_a_full_budget_the_ends_change_nothing() -> None:
     """Feedback reaches the hand as it is, and the reference goes where the hand is, at rest."""
     layout = POSE
     settings = LinkSettings(reserve=100.0, capacity=100.0)
-    start = Reference.still(layout.identity, layout)
+    start = Reference.at_rest(layout.identity, layout)
     team = ObservedTeam(settings, layout, np.ones(6), PERIOD, start)
     device = ObservedDevice(settings, np.ones(6), PERIOD)
     feedback = np.array([1.0, -2.0, 3.0, 0.1, 0.2, -0.3])
@@ -170,8 +170,8 @@ def test_with_a_full_budget_the_ends_change_nothing() -> None:
 
 def test_an_overtaken_packet_brings_no_old_motion() -> None:
     """The newest counts, not the last to arrive."""
-    layout = Layout.numbers(1)
-    team = ObservedTeam(LinkSettings(), layout, np.ones(1), PERIOD, Reference.still([0.0]))
+    layout = Layout.scalars(1)
+    team = ObservedTeam(LinkSettings(), layout, np.ones(1), PERIOD, Reference.at_rest([0.0]))
     for number, place in ((2, 0.2), (1, 0.1)):
         team.hear(Packet(number, (np.array([place]), np.zeros(1)), 0.0, 0.0))
     for _ in range(500):
@@ -188,6 +188,6 @@ def test_the_hand_fills_the_budget_of_the_team() -> None:
     device.hear(Packet(1, (np.zeros(1),), 0.0, 0.1))
     force = device.force(velocity)
     assert force[0] == pytest.approx(-5.0)
-    packet = device.moved(force, PERIOD * velocity, Reference.still([0.0]))
+    packet = device.moved(force, PERIOD * velocity, Reference.at_rest([0.0]))
     assert packet.energy == pytest.approx(0.0015)
     assert packet.level == pytest.approx(0.001)

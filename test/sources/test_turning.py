@@ -158,7 +158,7 @@ def test_a_turning_hand_follows_its_equation_of_motion():
         return np.concatenate([y[3:], pull / 0.01])
 
     phi = solve_ivp(rate, (0.0, 400 * period), np.zeros(6), rtol=1e-10, atol=1e-12).y[:3, -1]
-    found = hand.deflect(Reference.still(POSE.identity, POSE), force)
+    found = hand.deflect(Reference.at_rest(POSE.identity, POSE), force)
     np.testing.assert_allclose(so3.log(found.position[3:]), phi, atol=2e-3)
     straight = Hand(0.8, 6.0, 150.0, period, dim=3)
     straight.advance(force[:3], 400)

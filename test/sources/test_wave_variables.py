@@ -35,7 +35,7 @@ def test_power_at_the_device_is_that_of_its_waves() -> None:
 def test_power_at_the_team_is_that_of_its_waves() -> None:
     """F' v = (u' u - w' w) / 2 once the smoothing has settled."""
     rng = np.random.default_rng(2)
-    start = Reference.still(POSE.identity, POSE)
+    start = Reference.at_rest(POSE.identity, POSE)
     for _ in range(5):
         team = WaveTeam(RICH, POSE, METRIC, PERIOD, start)
         wave, feedback = rng.normal(size=(2, 6))
@@ -49,7 +49,7 @@ def test_power_at_the_team_is_that_of_its_waves() -> None:
 
 def test_a_matched_team_sends_nothing_back_and_the_hand_feels_the_impedance() -> None:
     """A damper of the link's impedance at the far end is a damper in the hand, at any delay."""
-    start = Reference.still(POSE.identity, POSE)
+    start = Reference.at_rest(POSE.identity, POSE)
     device, team = WaveDevice(RICH, METRIC, PERIOD), WaveTeam(RICH, POSE, METRIC, PERIOD, start)
     velocity = np.array([0.2, 0.0, 0.1, 0.0, 1.0, 0.0])
     place, reference = POSE.identity, start

@@ -128,7 +128,9 @@ def test_differences_go_the_shorter_way_round() -> None:
 
 
 def unsound(robots: Team, q: np.ndarray, **keys: Any) -> float:
-    return block(**keys).build("elbows", robots).soundness(robots.state(q, np.zeros(14)))
+    return (
+        block(**keys).build("elbows", robots).singularity_distance(robots.state(q, np.zeros(14)))
+    )
 
 
 def test_where_there_is_no_angle_soundness_is_zero_and_nothing_is_infinite() -> None:

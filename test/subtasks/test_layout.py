@@ -32,13 +32,13 @@ def test_a_rotation_is_four_numbers_of_a_value_and_three_of_a_velocity():
 
 def test_plain_numbers_are_reckoned_with_as_ever():
     """Without rotations every operation is the plain one, to the bit."""
-    layout, rng = Layout.numbers(5), np.random.default_rng(0)
+    layout, rng = Layout.scalars(5), np.random.default_rng(0)
     a, b = ([rng.normal(size=5) for _ in range(3)] for _ in range(2))
     assert not layout.rotates
     np.testing.assert_array_equal(layout.difference(a[0], b[0]), a[0] - b[0])
-    np.testing.assert_array_equal(layout.gap(a, b), np.subtract(a, b))
-    np.testing.assert_array_equal(layout.moved(a, b), np.add(a, b))
-    x, v, acceleration = layout.ahead(a, 0.3)
+    np.testing.assert_array_equal(layout.relative_motion(a, b), np.subtract(a, b))
+    np.testing.assert_array_equal(layout.compose_motion(a, b), np.add(a, b))
+    x, v, acceleration = layout.extrapolate(a, 0.3)
     np.testing.assert_array_equal(x, a[0] + 0.3 * a[1] + (0.5 * 0.3 * 0.3) * a[2])
     np.testing.assert_array_equal(v, a[1] + 0.3 * a[2])
     assert acceleration is a[2]
@@ -82,7 +82,7 @@ def path(layout: Layout, seed: int):
     def at(t: float):
         gap = (amplitude * np.sin(t), amplitude * np.cos(t), -amplitude * np.sin(t))
         bent = tuple(np.roll(part, 1) * f for part, f in zip(gap, (1, 1, 1), strict=True))
-        return layout.moved(layout.moved((start, still, still), gap), bent)
+        return layout.compose_motion(layout.compose_motion((start, still, still), gap), bent)
 
     return at
 
@@ -108,10 +108,12 @@ def test_gaps_have_exact_derivatives_and_lead_back():
     """The gap between two motions moves with its rates, and added again gives the motion."""
     for seed in range(5):
         one, other = path(MIXED, seed), path(MIXED, seed + 50)
-        gap = MIXED.gap(one(0.4), other(0.4))
-        for found, expected in zip(MIXED.moved(other(0.4), gap)[1:], one(0.4)[1:], strict=True):
+        gap = MIXED.relative_motion(one(0.4), other(0.4))
+        for found, expected in zip(
+            MIXED.compose_motion(other(0.4), gap)[1:], one(0.4)[1:], strict=True
+        ):
             np.testing.assert_allclose(found, expected, atol=1e-11)
-        before, after = (MIXED.gap(one(t), other(t)) for t in (0.4 - STEP, 0.4 + STEP))
+        before, after = (MIXED.relative_motion(one(t), other(t)) for t in (0.4 - STEP, 0.4 + STEP))
         np.testing.assert_allclose(gap[1], (after[0] - before[0]) / (2 * STEP), atol=1e-5)
         np.testing.assert_allclose(gap[2], (after[1] - before[1]) / (2 * STEP), atol=1e-4)
 
@@ -119,10 +121,10 @@ def test_gaps_have_exact_derivatives_and_lead_back():
 def test_extrapolation_has_exact_derivatives_and_the_right_start():
     """Ahead by nothing it is the motion itself; ahead by dt its rates are those of its path."""
     motion = path(MIXED, 7)(0.3)
-    for found, expected in zip(MIXED.ahead(motion, 0.0)[1:], motion[1:], strict=True):
+    for found, expected in zip(MIXED.extrapolate(motion, 0.0)[1:], motion[1:], strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-14, atol=1e-15)
-    _, velocity, acceleration = MIXED.ahead(motion, 0.2)
-    expected = slopes(MIXED, lambda dt: MIXED.ahead(motion, dt), 0.2)
+    _, velocity, acceleration = MIXED.extrapolate(motion, 0.2)
+    expected = slopes(MIXED, lambda dt: MIXED.extrapolate(motion, dt), 0.2)
     np.testing.assert_allclose(velocity, expected[0], atol=1e-7)
     np.testing.assert_allclose(acceleration, expected[1], atol=1e-6)
 
@@ -130,7 +132,7 @@ def test_extrapolation_has_exact_derivatives_and_the_right_start():
 def test_a_steady_turn_goes_on_for_good():
     """Constant angular velocity stays constant, over any time."""
     layout, omega = Layout((0,), (True,)), np.array([0.3, -2.0, 1.0])
-    x, velocity, acceleration = layout.ahead((layout.identity, omega, np.zeros(3)), 100.0)
+    x, velocity, acceleration = layout.extrapolate((layout.identity, omega, np.zeros(3)), 100.0)
     np.testing.assert_allclose(velocity, omega, rtol=1e-12)
     np.testing.assert_allclose(acceleration, np.zeros(3), atol=1e-12)
     assert np.linalg.norm(x) == pytest.approx(1.0, abs=1e-15)

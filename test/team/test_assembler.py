@@ -37,7 +37,7 @@ MOTION = Motion(
 
 
 def tell(assembler: StateAssembler, joints: np.ndarray, stamp: int) -> None:
-    assembler.take(joints, stamp, MOTION.at(stamp, 0)[joints], MOTION.at(stamp, 1)[joints])
+    assembler.update(joints, stamp, MOTION.at(stamp, 0)[joints], MOTION.at(stamp, 1)[joints])
 
 
 def worst(prediction: str, offset_ns: int) -> tuple[np.ndarray, np.ndarray]:
@@ -131,17 +131,17 @@ def test_joints_may_be_told_of_one_by_one() -> None:
     """A message may hold some joints only; nothing is told before every joint is known."""
     assembler = StateAssembler(NAMES, "velocity", 0.02)
     for joint in range(4):
-        assert not assembler.fresh
-        assert assembler.unheard == NAMES[joint:]
+        assert not assembler.ready
+        assert assembler.missing == NAMES[joint:]
         tell(assembler, np.array([joint]), joint * MILLISECOND // 4)
-    assert assembler.fresh
+    assert assembler.ready
     assert not assembler.simultaneous
     state = assembler.assemble()
-    assert not assembler.fresh
+    assert not assembler.ready
     np.testing.assert_allclose(state.ages, [0.75e-3, 0.5e-3, 0.25e-3, 0.0])
-    assembler.forget(LEFT)
-    assert assembler.unheard == NAMES[:2]
-    assert not assembler.fresh
+    assembler.reset(LEFT)
+    assert assembler.missing == NAMES[:2]
+    assert not assembler.ready
 
 
 def test_efforts_are_those_that_were_measured() -> None:
@@ -149,5 +149,5 @@ def test_efforts_are_those_that_were_measured() -> None:
     assembler = StateAssembler(NAMES, "velocity", 0.02)
     tell(assembler, LEFT, 0)
     nothing = np.zeros(2)
-    assembler.take(RIGHT, 0, nothing, nothing, np.array([3.0, np.nan]))
+    assembler.update(RIGHT, 0, nothing, nothing, np.array([3.0, np.nan]))
     np.testing.assert_array_equal(assembler.assemble().effort, [np.nan, np.nan, 3.0, np.nan])

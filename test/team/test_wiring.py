@@ -23,12 +23,12 @@ def scenario(**changes: Any) -> Scenario:
 
 def test_an_effort_controller_has_an_order_of_its_own() -> None:
     """Numbers on its topic are placed by the driver's names."""
-    wiring = scenario().robots["left"].wiring
+    wiring = scenario().robots["left"].topics
     joints = ["joint_1", "joint_2"]
     assert wiring.driver_joints(joints) == ["left_joint_1", "left_joint_2"]
     assert wiring.effort_order(joints) == [1, 0]
-    assert scenario(effort_joints=None).robots["left"].wiring.effort_order(joints) == [0, 1]
-    assert scenario().own_states
+    assert scenario(effort_joints=None).robots["left"].topics.effort_order(joints) == [0, 1]
+    assert scenario().has_robot_state_topics
 
 
 @pytest.mark.parametrize(

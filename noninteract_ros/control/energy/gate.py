@@ -261,7 +261,7 @@ class EnergyGate:
     def _foretold(self, last: TickTerms, duration: float) -> tuple[Array, Array, Array]:
         """Where references were bound: value, rate, and the way there, shape (n,)."""
         then = [
-            reference.at(duration, subtask.layout)
+            reference.extrapolate(duration, subtask.layout)
             for reference, subtask in zip(last.references, self._stack.subtasks, strict=True)
         ]
         rate = np.concatenate([item.velocity for item in then])

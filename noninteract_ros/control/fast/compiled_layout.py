@@ -24,24 +24,24 @@ class CompiledLayout(Layout):
 
     @cached_property
     def _functions(self) -> tuple[Callable[..., Array], Callable[..., tuple[Array, Array]]]:
-        """Difference and departure; numba is imported by who needs them."""
-        from noninteract_ros.control.fast.kernels.motions import Numbers, departure, difference
+        """Difference and deviation; numba is imported by who needs them."""
+        from noninteract_ros.control.fast.kernels.motions import Numbers, deviation, difference
 
         begin = self.quaternions[:, 0].copy(), self.angular[:, 0].copy()
         numbers = Numbers(self.values, self.rates, self._wound_rates, *begin)
-        return partial(difference, numbers), partial(departure, numbers)
+        return partial(difference, numbers), partial(deviation, numbers)
 
     def prepare(self) -> None:
         """Has both methods compiled, which must not happen in a tick."""
         still = self.identity, np.zeros(self.dim), np.zeros(self.dim)
         self.difference(self.identity, self.identity)
-        self.departure(still, still, 0.0)
+        self.deviation(still, still, 0.0)
 
     def difference(self, x: Array, x_d: Array) -> Array:
         """x - x_d of single values; for rotations log(R R_d'), shape (dim,)."""
         return self._functions[0](np.array(x), np.array(x_d))
 
-    def departure(
+    def deviation(
         self, motion: ValueMotion, before: ValueMotion, dt: float
     ) -> tuple[Array, Array]:
         """Difference and its rate between a motion and where another one led `dt` s later."""

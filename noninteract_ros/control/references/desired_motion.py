@@ -50,7 +50,7 @@ class MotionShaper:
     def at_rate(self, start: Reference, rate: Array, step: float) -> tuple[Reference, bool]:
         """State `step` seconds on the way to a velocity, and whether it is reached."""
         self._input.control_interface = ControlInterface.Velocity
-        return self._advance(start, rate, step) or (Reference.still(start.position), False)
+        return self._advance(start, rate, step) or (Reference.at_rest(start.position), False)
 
     def _advance(
         self, start: Reference, speed: Array, step: float
@@ -115,20 +115,20 @@ class DesiredMotion:
     """
 
     def __init__(self, limits: Array, direct: bool, layout: Layout | None = None) -> None:
-        layout = layout or Layout.numbers(limits.shape[1])
+        layout = layout or Layout.scalars(limits.shape[1])
         self._limits, self._direct, self._layout = limits, direct, layout
         self._shaper, self._inheritance = MotionShaper(limits), AccelerationCarryOver(limits)
         self._zero = Target(np.zeros(layout.dim), np.zeros(layout.dim))
-        self.rest_at(layout.identity)
+        self.hold_at(layout.identity)
 
     @property
     def now(self) -> Reference:
         """Desired position, velocity and acceleration at the last tick."""
         return self._now
 
-    def rest_at(self, x: Array) -> None:
+    def hold_at(self, x: Array) -> None:
         """Starts anew: at rest at x, shape (size,)."""
-        self._now = Reference.still(x, self._layout)
+        self._now = Reference.at_rest(x, self._layout)
         self._followed: Reference | None = None
         self._gap: Reference | None = None
         self._chart: tuple[Array, Reference] | None = None
@@ -158,14 +158,14 @@ class DesiredMotion:
             if not done or motion.velocity.any():
                 return shaped
             self._chart = None
-            return Reference.still(motion.position, self._layout)
+            return Reference.at_rest(motion.position, self._layout)
         self._chart = None
         if isinstance(motion, Rate):
             return self._at_rate(motion.velocity, step)[0]
         if not (self._now.velocity.any() or self._now.acceleration.any()):
             return self._now
         shaped, done = self._at_rate(self._zero.velocity, step)
-        return Reference.still(shaped.position, self._layout) if done else shaped
+        return Reference.at_rest(shaped.position, self._layout) if done else shaped
 
     def _towards(self, target: Target, step: float) -> tuple[Reference, bool]:
         """Shapes in coordinates about the target's rotations, which are zero there.
@@ -174,7 +174,7 @@ class DesiredMotion:
         it has made itself comes back with another rounding.
         """
         layout = self._layout
-        origin = Reference.still(layout.origin(target.position), layout)
+        origin = Reference.at_rest(layout.origin(target.position), layout)
         goal = Target(layout.difference(target.position, origin.position), target.velocity)
         if self._chart is not None and np.array_equal(self._chart[0], origin.position):
             start = self._chart[1]
@@ -187,7 +187,7 @@ class DesiredMotion:
     def _at_rate(self, rate: Array, step: float) -> tuple[Reference, bool]:
         """Shapes in coordinates about the rotations that it has."""
         layout = self._layout
-        origin = Reference.still(layout.origin(self._now.position), layout)
+        origin = Reference.at_rest(layout.origin(self._now.position), layout)
         shaped, done = self._shaper.at_rate(self._now.minus(origin, layout), rate, step)
         return origin.plus(shaped, layout), done
 
@@ -196,7 +196,7 @@ class DesiredMotion:
         if self._direct:
             return motion
         if self._jumps(motion, step):
-            before = motion.at(-step, self._layout)
+            before = motion.extrapolate(-step, self._layout)
             self._gap = self._inheritance.of(self._now, before).minus(before, self._layout)
         if self._gap is not None and step > 0.0:
             self._gap, closed = self._shaper.towards(self._gap, self._zero, step)
@@ -208,7 +208,7 @@ class DesiredMotion:
         """Whether a reference is new or leaves its own path by more than the limits allow."""
         if self._followed is None:
             return True
-        away, velocity = motion.departure(self._followed, step, self._layout)
+        away, velocity = motion.deviation(self._followed, step, self._layout)
         max_velocity, max_acceleration, _ = self._limits
         return bool(
             (np.abs(away) > max_velocity * step).any()

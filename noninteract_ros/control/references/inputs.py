@@ -48,11 +48,11 @@ class Source:
     """The inputs of one source to one subtask, in the order of their stamps.
 
     Attributes:
-        heard_until: The source has said all it wants to say up to this time [s].
+        complete_until: The source has said all it wants to say up to this time [s].
     """
 
     def __init__(self) -> None:
-        self.heard_until = -np.inf
+        self.complete_until = -np.inf
         self._motions: deque[tuple[float, MotionInput]] = deque()
         self._forces: deque[tuple[float, Force]] = deque()
         self._motion: tuple[float, MotionInput] | None = None
@@ -68,7 +68,7 @@ class Source:
             self._append(self._forces, self._force, stamp, item, now)
         else:
             self._append(self._motions, self._motion, stamp, item, now)
-            self.heard_until = max(self.heard_until, stamp)
+            self.complete_until = max(self.complete_until, stamp)
 
     @staticmethod
     def _append(
@@ -81,11 +81,11 @@ class Source:
             raise InputError(f"stamp {stamp:.6f} s is ahead of the team's time {now:.6f} s")
         queue.append((stamp, item))
 
-    def silent_until(self, stamp: float) -> None:
+    def mark_complete_until(self, stamp: float) -> None:
         """Notes that the source has nothing new to say up to `stamp` [s]."""
-        self.heard_until = max(self.heard_until, stamp)
+        self.complete_until = max(self.complete_until, stamp)
 
-    def forget(self) -> None:
+    def discard_inputs(self) -> None:
         """Drops the inputs that have come so far."""
         self._motions.clear()
         self._forces.clear()

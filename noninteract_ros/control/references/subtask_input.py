@@ -103,20 +103,20 @@ class SubtaskInput:
         self._max_force_rate = spread(subtask, "max_wrench_rate", settings.max_wrench_rate)
         self._force: Array = np.zeros(subtask.dim)
 
-    def rest_at(self, x: Array) -> None:
+    def hold_at(self, x: Array) -> None:
         """Holds at x, shape (size,), until the source in force speaks again."""
-        self._desired.rest_at(x)
+        self._desired.hold_at(x)
         self._force = np.zeros(self._layout.dim)
 
-    def resting(self, now: float) -> SubtaskCommand:
+    def hold(self, now: float) -> SubtaskCommand:
         """At rest where it is, whatever the sources say up to `now` [s]."""
         self._take(now)
         return SubtaskCommand(self._desired.now, self._force, "hold", False)
 
-    def forget(self) -> None:
+    def discard_inputs(self) -> None:
         """Drops every input that has come so far."""
         for source in self.sources.values():
-            source.forget()
+            source.discard_inputs()
 
     def reset(self) -> None:
         """Starts anew with sources that have never spoken."""
@@ -161,5 +161,5 @@ class SubtaskInput:
     def _as_of(self, now: float, stamp: float, motion: MotionInput) -> MotionInput:
         """What a motion that was given for `stamp` asks for now."""
         if isinstance(motion, Reference):
-            return motion.at(now - stamp, self._layout)
+            return motion.extrapolate(now - stamp, self._layout)
         return motion

@@ -64,4 +64,4 @@ class SingularityEscape:
     def _measure(self, q: Array) -> float:
         state = self._team.state(q, self._still)
         relative = regularity(inverse(self._stack.evaluate(state).J)) / self._best
-        return min(relative, self._stack.soundness(state))
+        return min(relative, self._stack.singularity_distance(state))

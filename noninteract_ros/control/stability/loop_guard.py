@@ -23,7 +23,7 @@ class LoopGuard:
     def __init__(self, team: Team, stack: SubtaskStack, rate: float) -> None:
         self._team, self._stack, self._rate = team, stack, rate
 
-    def objection(
+    def rejection(
         self, q: Array, wanted: tuple[str, Impedance], in_force: tuple[str, Impedance]
     ) -> str:
         """Why a change must not be made, and what would cure it; or an empty text.

@@ -164,7 +164,7 @@ def measure(
         if "law" in parts:
             rows += law_rows(name, material, settings.ticks)
         # Robots with topics of their own have no single state to be answered.
-        if "node" in parts and name not in teams and not material.scenario.own_states:
+        if "node" in parts and name not in teams and not material.scenario.has_robot_state_topics:
             rows += node_rows(name, values, material, settings.ticks)
     if "lockstep" in parts:
         begin("lockstep of the real programs")

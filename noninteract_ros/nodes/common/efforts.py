@@ -92,7 +92,7 @@ class EffortOutputs:
         self._silence, self._fade = general.state_timeout, general.transition_time
         self._outputs: list[_Output] = []
         for robot, part in zip(team.robots, team.velocity_slices, strict=True):
-            wiring = node.scenario.robots[robot.name].wiring
+            wiring = node.scenario.robots[robot.name].topics
             if wiring.effort_topic:
                 # What is not the newest must not be applied, so none is kept.
                 publisher = node.create_publisher(Float64MultiArray, wiring.effort_topic, 1)

@@ -39,7 +39,7 @@ class SourceWatch:
         other. It says everything again when the team sends its state again; then it is believed.
         """
         subtask, source = name.split("/")
-        heard = self._inputs[subtask].sources[source].heard_until > -float("inf")
+        heard = self._inputs[subtask].sources[source].complete_until > -float("inf")
         if heard or when <= now + 1e-9 or name not in self._names or name in self._passed_over:
             self._passed_over.discard(name)
             return False
@@ -56,11 +56,11 @@ class SourceWatch:
         missing = []
         for name in self._names:
             subtask, source = name.split("/")
-            heard_until = self._inputs[subtask].sources[source].heard_until
-            if heard_until >= now - 1e-9:
+            complete_until = self._inputs[subtask].sources[source].complete_until
+            if complete_until >= now - 1e-9:
                 self.absent.discard(name)
             elif name not in self.absent:
-                limit = self._timeout if heard_until > -float("inf") else START_TIMEOUT
+                limit = self._timeout if complete_until > -float("inf") else START_TIMEOUT
                 if time.monotonic() - waiting_since > limit:
                     self.absent.add(name)
                 else:

@@ -113,7 +113,7 @@ class Controller(ScenarioNode):
         if self._watch.begins_ahead(f"{subtask}/{source}", when, self._now):
             return
         if item is None:
-            heard.silent_until(when)
+            heard.mark_complete_until(when)
             return
         if self.lockstep and self._now <= when < seconds(self._order.last(topic)):
             return  # A source that saw the state again says again what it has said.

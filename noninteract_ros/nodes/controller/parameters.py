@@ -111,7 +111,7 @@ class LiveParameters:
         in_force = stack_impedance(subtasks, list(self._impedances.values()))
         q = self._configuration()
         q = self._core.team.q0 if q is None else q
-        return self._guard.objection(q, (law, wanted), (self._law, in_force))
+        return self._guard.rejection(q, (law, wanted), (self._law, in_force))
 
     def follow_authority(self) -> None:
         """Has the parameters tell who leads, where it is not who was last asked for."""

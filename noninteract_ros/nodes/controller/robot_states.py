@@ -128,7 +128,7 @@ class RobotStates:
         self.late: tuple[str, ...] = ()
         qos = LOOP_QOS if node.lockstep else DRIVER_QOS
         for robot, part in zip(team.robots, team.velocity_slices, strict=True):
-            wiring = node.scenario.robots[robot.name].wiring
+            wiring = node.scenario.robots[robot.name].topics
             codec = DriverStateCodec(wiring.driver_joints(list(robot.model.names)[1:]))
             topic = wiring.joint_states_topic
             listen = partial(self._on_message, topic, codec, part.start)
@@ -145,8 +145,8 @@ class RobotStates:
                 # Who gives no time is believed to speak of now.
                 stamp = stamp or self._node.get_clock().now().nanoseconds
                 if self._order.take(f"{topic} {joints[0]}", stamp, self._lead):
-                    self._assembler.forget(joints)
-            self._assembler.take(joints, stamp, position, velocity, effort)
+                    self._assembler.reset(joints)
+            self._assembler.update(joints, stamp, position, velocity, effort)
             if not (self._node.lockstep and self._assembler.simultaneous):
                 return
             state = self._assembler.assemble()
@@ -155,7 +155,7 @@ class RobotStates:
     def poll(self) -> None:
         """Wall time: tells of the team, if a robot has told something new."""
         with self._lock:
-            state = self._assembler.assemble() if self._assembler.fresh else None
+            state = self._assembler.assemble() if self._assembler.ready else None
         if state is None or self._waits(state):
             return
         parts = zip(self._team.names, self._team.velocity_slices, strict=True)
@@ -192,5 +192,5 @@ class RobotStates:
     def waiting_for(self) -> list[str]:
         """Robots that have not told of all their joints yet."""
         with self._lock:
-            unheard = self._assembler.unheard
+            unheard = self._assembler.missing
         return list(dict.fromkeys(name.partition("/")[0] for name in unheard))

@@ -36,7 +36,7 @@ class TeamLink:
         self.efforts = EffortOutputs(node, team)
         self._last = b""
         self._robots: RobotStates | None = None
-        if node.scenario.own_states:
+        if node.scenario.has_robot_state_topics:
             self._robots = RobotStates(node, team, take)
         else:
             node.subscribe(JointState, "joint_states", self._on_state, raw=True)

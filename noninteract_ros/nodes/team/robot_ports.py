@@ -70,13 +70,13 @@ class RobotPorts:
         self._heard = np.zeros(team.n)
         self._listeners: list[_Listener] = []
         self._speakers: list[_Speaker] = []
-        if not node.scenario.own_states:
+        if not node.scenario.has_robot_state_topics:
             publisher = node.create_publisher(JointState, "joint_states", LOOP_QOS)
             codec = JointStateCodec(team.joint_names)
             self._speakers.append(_Speaker(slice(0, team.n), codec, publisher))
         rest = _Listener([], [])
         for index, robot in enumerate(team.robots):
-            wiring = node.scenario.robots[robot.name].wiring
+            wiring = node.scenario.robots[robot.name].topics
             if wiring.joint_states_topic:
                 self._add_speaker(index)
             if wiring.effort_topic:
@@ -93,7 +93,7 @@ class RobotPorts:
 
     def _add_speaker(self, index: int) -> None:
         general, robot = self._node.scenario.general, self._team.robots[index]
-        wiring = self._node.scenario.robots[robot.name].wiring
+        wiring = self._node.scenario.robots[robot.name].topics
         publisher = self._node.create_publisher(JointState, wiring.joint_states_topic, LOOP_QOS)
         codec = JointStateCodec(wiring.driver_joints(list(robot.model.names)[1:]))
         own_rate = wiring.joint_states_rate and not self._node.lockstep
@@ -104,7 +104,7 @@ class RobotPorts:
 
     def _add_listener(self, index: int) -> None:
         robot, part = self._team.robots[index], self._team.velocity_slices[index]
-        wiring = self._node.scenario.robots[robot.name].wiring
+        wiring = self._node.scenario.robots[robot.name].topics
         listener = _Listener(
             [robot.name], list(range(part.start, part.stop)), wiring.gravity_compensated
         )

@@ -17,7 +17,7 @@ from noninteract_ros.reporting.recording.recorded import Recorded
 from noninteract_ros.reporting.rendering.painter import Camera, outlines, paint, shadows
 from noninteract_ros.reporting.rendering.scene import Scene, Snapshot
 from noninteract_ros.reporting.rendering.style import COLOURS, styled
-from noninteract_ros.scenario.shapes import NOBODY
+from noninteract_ros.scenario.shapes import NO_ROBOT
 from noninteract_ros.simulation.environment import Wall
 from noninteract_ros.team.geometry.hulls import Hull
 
@@ -117,7 +117,7 @@ class Animation:
         return [
             (_colour(owner), ghost)
             for (owner, hull), (_, ghost) in zip(hulls, wanted, strict=True)
-            if owner != NOBODY and np.abs(ghost.points - hull.points).max() > apart
+            if owner != NO_ROBOT and np.abs(ghost.points - hull.points).max() > apart
         ]
 
     def _draw_ground(self, axes: Axes) -> None:
@@ -188,7 +188,7 @@ class Animation:
 
 
 def _colour(owner: int) -> str:
-    return BODY_COLOUR if owner == NOBODY else COLOURS[owner % (len(COLOURS) - 1)]
+    return BODY_COLOUR if owner == NO_ROBOT else COLOURS[owner % (len(COLOURS) - 1)]
 
 
 @styled

@@ -191,7 +191,9 @@ class Scene:
     def hulls(self, q: Array) -> list[tuple[int, Hull]]:
         """Owner and body in the world of every shape, for a configuration of the plant."""
         pin.forwardKinematics(self.plant.model, self._data, q)
-        return [(item.owner, item.hull.moved(self._data.oMi[item.joint])) for item in self.shapes]
+        return [
+            (item.owner, item.hull.transformed(self._data.oMi[item.joint])) for item in self.shapes
+        ]
 
     def tools(self, q: Array) -> list[pin.SE3]:
         """Tool frames in the world, for a configuration of the plant."""

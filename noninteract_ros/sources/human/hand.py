@@ -99,9 +99,9 @@ class TurningHand:
         place = self._place.deviation(force[self._layout.rates])
         turn = self._turn.deviation(self._torque(force))
         gap = Reference(
-            self._layout.merged(place.position, turn.position),
-            self._layout.merged(place.velocity, turn.velocity),
-            self._layout.merged(place.acceleration, turn.acceleration),
+            self._layout.stack_components(place.position, turn.position),
+            self._layout.stack_components(place.velocity, turn.velocity),
+            self._layout.stack_components(place.acceleration, turn.acceleration),
         )
         return intended.plus(gap, self._layout)
 

@@ -20,7 +20,7 @@ TREMOR_FREQUENCIES = np.array([70.0**0.5, 4.0 * 5.0**0.5, 6.0 * 3.0**0.5, 8.0 * 
 
 def still(position: ArrayLike, layout: Layout | None = None) -> Trajectory:
     """Rests at a value of shape (size,) [m; quaternions]."""
-    reference = Reference.still(position, layout)
+    reference = Reference.at_rest(position, layout)
     return lambda t: reference
 
 
@@ -125,14 +125,14 @@ def turning(
     """
     middle = layout.identity.copy()
     middle[layout.quaternions] = np.reshape(orientations, (-1, 4))
-    base = Reference.still(middle, layout)
+    base = Reference.at_rest(middle, layout)
 
     def motion(t: float) -> Reference:
         p, r = place(t), turn(t)
         gap = Reference(
-            layout.merged(p.position, r.position),
-            layout.merged(p.velocity, r.velocity),
-            layout.merged(p.acceleration, r.acceleration),
+            layout.stack_components(p.position, r.position),
+            layout.stack_components(p.velocity, r.velocity),
+            layout.stack_components(p.acceleration, r.acceleration),
         )
         return base.plus(gap, layout)
 

@@ -89,7 +89,7 @@ def replay(times: Array, values: Array, layout: Layout | None = None) -> Traject
         values: Values [m; quaternions], shape (n, size).
         layout: Layout of a value; plain numbers, if None.
     """
-    layout = layout or Layout.numbers(values.shape[1])
+    layout = layout or Layout.scalars(values.shape[1])
     since = times - times[0]
     plain = CubicSpline(since, values[:, layout.values])
     turns = [
@@ -98,7 +98,7 @@ def replay(times: Array, values: Array, layout: Layout | None = None) -> Traject
 
     def motion(t: float) -> Reference:
         if t < 0.0 or t > since[-1]:
-            return Reference.still(values[0 if t < 0.0 else -1], layout)
+            return Reference.at_rest(values[0 if t < 0.0 else -1], layout)
         x, v, a = np.empty(layout.size), np.empty(layout.dim), np.empty(layout.dim)
         x[layout.values], v[layout.rates], a[layout.rates] = (
             plain(t, order) for order in range(3)

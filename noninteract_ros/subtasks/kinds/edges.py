@@ -43,7 +43,7 @@ def edge_names(pairs: Sequence[tuple[str, str]]) -> tuple[str, ...]:
     return tuple(f"{first}-{second}" for first, second in pairs)
 
 
-def edge_places(pairs: Sequence[tuple[str, str]], team: Team) -> list[tuple[int, int]]:
+def edge_indices(pairs: Sequence[tuple[str, str]], team: Team) -> list[tuple[int, int]]:
     """Pairs of places in the team."""
     return [(team.index(first), team.index(second)) for first, second in pairs]
 
@@ -51,7 +51,7 @@ def edge_places(pairs: Sequence[tuple[str, str]], team: Team) -> list[tuple[int,
 def edge_weights(pairs: Sequence[tuple[str, str]], team: Team) -> Array:
     """+1 for the first and -1 for the second robot of each pair, shape (pairs, N)."""
     weights = np.zeros((len(pairs), len(team.robots)))
-    for row, (first, second) in zip(weights, edge_places(pairs, team), strict=True):
+    for row, (first, second) in zip(weights, edge_indices(pairs, team), strict=True):
         row[first], row[second] = 1.0, -1.0
     return weights
 

@@ -133,7 +133,7 @@ class _Arm:
         )
         return elbow - shoulder, wrist - shoulder
 
-    def soundness(self, q: Array) -> float:
+    def singularity_distance(self, q: Array) -> float:
         """Smaller sine of the line's angles to the upper arm and to the reference."""
         d, a = self.lines(q)
         length = float(np.linalg.norm(a))
@@ -201,6 +201,6 @@ class ElbowAngles(Subtask):
             x[i], J[i, arm.in_v], J_rate[i, arm.in_v] = arm.evaluate(state.q, state.v)
         return SubtaskState(x, J, J_rate)
 
-    def soundness(self, state: TeamState) -> float:
+    def singularity_distance(self, state: TeamState) -> float:
         """How far the arms are from being straight and from pointing along the reference."""
-        return min(arm.soundness(state.q) for arm in self._arms)
+        return min(arm.singularity_distance(state.q) for arm in self._arms)

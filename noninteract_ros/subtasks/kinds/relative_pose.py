@@ -11,9 +11,9 @@ from noninteract_ros.subtasks.kinds.edges import (
     FRAME_DOC,
     NO_SUBTASKS,
     WORLD,
+    edge_indices,
     edge_names,
     edge_pairs,
-    edge_places,
     edge_weights,
     frame_named,
 )
@@ -48,7 +48,7 @@ class RelativePose:
                 frame is no subtask with an orientation.
         """
         pairs = edge_pairs(name, self.edges, team)
-        places = edge_places(pairs, team)
+        places = edge_indices(pairs, team)
         frame = frame_named(name, self.frame, others)
         weights = edge_weights(pairs, team)
         points: Part = MixedPoints(weights) if frame is None else RelativePoints(weights, frame)
@@ -74,7 +74,7 @@ class RelativeOrientation:
         pairs = edge_pairs(name, self.edges, team)
         frame = frame_named(name, self.frame, others)
         offsets = tool_offsets(team, self.alignment)
-        places = edge_places(pairs, team)
+        places = edge_indices(pairs, team)
         rotations = RelativeRotations(places, offsets, frame)
         subtask = ComposedSubtask(name, edge_names(pairs), (), None, rotations)
         subtask.mixing = EdgeMixing((), tuple(places), True, offsets, frame)

@@ -11,9 +11,9 @@ from noninteract_ros.subtasks.kinds.edges import (
     FRAME_DOC,
     NO_SUBTASKS,
     WORLD,
+    edge_indices,
     edge_names,
     edge_pairs,
-    edge_places,
     edge_weights,
     frame_named,
 )
@@ -50,5 +50,5 @@ class RelativePosition:
         subtask: Subtask = MixedPosition(name, elements, axes, weights)
         if frame is not None:
             subtask = ComposedSubtask(name, elements, axes, RelativePoints(weights, frame), None)
-        subtask.mixing = EdgeMixing(axes, tuple(edge_places(pairs, team)), False, None, frame)
+        subtask.mixing = EdgeMixing(axes, tuple(edge_indices(pairs, team)), False, None, frame)
         return subtask

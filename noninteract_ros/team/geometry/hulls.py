@@ -30,7 +30,7 @@ class Hull:
     corners: Array
     normals: Array
 
-    def moved(self, placement: pin.SE3) -> "Hull":
+    def transformed(self, placement: pin.SE3) -> "Hull":
         """The same in another frame: x -> R x + p."""
         turn, shift = placement.rotation.T, placement.translation
         return Hull(self.points @ turn + shift, self.corners @ turn + shift, self.normals @ turn)
@@ -60,14 +60,14 @@ def _halved(corners: Array, longest: NDArray[np.intp]) -> Array:
     return np.concatenate((np.stack((a, middle, c), axis=1), np.stack((middle, b, c), axis=1)))
 
 
-def hull_of(points: Array) -> Hull:
+def convex_hull(points: Array) -> Hull:
     """Convex hull of points (m, 3), of those alone that stand out where they are many.
 
     Raises:
         scipy.spatial.QhullError: They lie in one plane.
     """
     if len(points) > CORNERS:
-        points = points[np.unique((points @ sphere(CORNERS).T).argmax(axis=0))]
+        points = points[np.unique((points @ sphere_points(CORNERS).T).argmax(axis=0))]
     found = ConvexHull(points)
     faces, flat = np.array(found.simplices), found.equations[:, :3]
     a, b, c = (points[faces[:, corner]] for corner in range(3))
@@ -89,7 +89,7 @@ def _normals(faces: NDArray[np.intp], flat: Array, areas: Array) -> Array:
     return normals
 
 
-def sphere(count: int) -> Array:
+def sphere_points(count: int) -> Array:
     """Points spread evenly over the unit sphere (Fibonacci's spiral), shape (count, 3)."""
     z = 1.0 - (2.0 * np.arange(count) + 1.0) / count
     angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
@@ -97,15 +97,15 @@ def sphere(count: int) -> Array:
     return np.stack((radius * np.cos(angle), radius * np.sin(angle), z), axis=1)
 
 
-def ball(radius: float, count: int = 60) -> Hull:
+def sphere(radius: float, count: int = 60) -> Hull:
     """A ball about the origin [m]."""
-    return hull_of(radius * sphere(count))
+    return convex_hull(radius * sphere_points(count))
 
 
 def box(size: Array) -> Hull:
     """A box about the origin, edges along the axes, of a size (3,) [m]."""
     signs = np.array(np.meshgrid((-0.5, 0.5), (-0.5, 0.5), (-0.5, 0.5))).reshape(3, 8).T
-    return hull_of(signs * size)
+    return convex_hull(signs * size)
 
 
 def cylinder(radius: float, length: float) -> Hull:
@@ -113,27 +113,27 @@ def cylinder(radius: float, length: float) -> Hull:
     angle = 2.0 * np.pi * np.arange(AROUND) / AROUND
     circle = radius * np.stack((np.cos(angle), np.sin(angle)), axis=1)
     ends = [np.column_stack((circle, np.full(AROUND, z))) for z in (-length / 2, length / 2)]
-    return hull_of(np.concatenate(ends))
+    return convex_hull(np.concatenate(ends))
 
 
-def stick(start: Array, end: Array, radius: float) -> Hull:
+def capsule(start: Array, end: Array, radius: float) -> Hull:
     """All that is no farther than a radius from the line between two points [m]."""
-    around = radius * sphere(CORNERS // 2)
-    return hull_of(np.concatenate((start + around, end + around)))
+    around = radius * sphere_points(CORNERS // 2)
+    return convex_hull(np.concatenate((start + around, end + around)))
 
 
-def hull_of_geometry(geometry: Any) -> Hull | None:
+def geometry_hull(geometry: Any) -> Hull | None:
     """Hull of a collision geometry of coal; None for a kind that has no size."""
     kind = type(geometry).__name__
     if hasattr(geometry, "vertices"):
-        return hull_of(np.asarray(geometry.vertices()))
+        return convex_hull(np.asarray(geometry.vertices()))
     if kind == "Box":
         return box(2.0 * np.asarray(geometry.halfSide))
     if kind == "Sphere":
-        return ball(geometry.radius)
+        return sphere(geometry.radius)
     if kind == "Cylinder":
         return cylinder(geometry.radius, 2.0 * geometry.halfLength)
     if kind == "Capsule":
         end = np.array([0.0, 0.0, geometry.halfLength])
-        return stick(-end, end, geometry.radius)
+        return capsule(-end, end, geometry.radius)
     return None

@@ -44,7 +44,7 @@ class ArmSettings(JointSettings):
         Raises:
             ScenarioError: A key does not fit the model.
         """
-        self.equip(name, model)
+        self.apply_to(name, model)
         base = base_pose(join(name, "base_pose"), self.base_pose)
         brakes = per_joint(join(name, "brake_damping"), self.brake_damping, joint_names(model))
         axes = tool_axes(model, tool_frame, base)

@@ -44,7 +44,7 @@ class PointMass(JointSettings):
         body = pin.Inertia(self.mass, np.zeros(3), np.zeros((3, 3)))
         model.appendBodyToJoint(parent, body, pin.SE3.Identity())
         model.addFrame(pin.Frame("tool", parent, pin.SE3.Identity(), pin.FrameType.OP_FRAME))
-        self.equip(name, model)
+        self.apply_to(name, model)
         path = join(name, "initial_position")
         limits = position_limits(model)
         start = configuration_within(path, self.initial_position, model, limits)

@@ -20,7 +20,7 @@ class RobotBlock(Protocol):
         """Its URDF, in the frame of its base."""
 
     @property
-    def wiring(self) -> RobotTopics:
+    def topics(self) -> RobotTopics:
         """Its topics."""
 
 

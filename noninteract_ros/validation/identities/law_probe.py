@@ -99,7 +99,10 @@ class LawProbe:
         state = self.team.state(q, rng.uniform(-SPEED, SPEED, n))
         dynamics = self.dynamics(state)
         e, e_rate, acceleration, force = rng.uniform(-ERROR, ERROR, (4, n))
-        if regularity(dynamics.S) < self._least or self.stack.soundness(state) < REGULAR:
+        if (
+            regularity(dynamics.S) < self._least
+            or self.stack.singularity_distance(state) < REGULAR
+        ):
             return None
         x_rate = dynamics.J @ state.v
         places = [

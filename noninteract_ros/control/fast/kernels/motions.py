@@ -66,7 +66,7 @@ def difference(numbers: Numbers, x: Array, x_d: Array) -> Array:
 
 
 @compiled
-def departure(
+def deviation(
     numbers: Numbers,
     x: Array,
     velocity: Array,

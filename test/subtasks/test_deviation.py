@@ -12,13 +12,13 @@ def motion_of(layout, rng):
     return x, rng.normal(size=layout.dim), rng.normal(size=layout.dim)
 
 
-@pytest.mark.parametrize("layout", [Layout((3, 2), (True, False)), Layout.numbers(4)])
+@pytest.mark.parametrize("layout", [Layout((3, 2), (True, False)), Layout.scalars(4)])
 @pytest.mark.parametrize("dt", [0.0, 0.01, 0.3])
-def test_departure_is_the_gap_from_what_lies_ahead(layout, dt):
+def test_deviation_is_the_gap_from_what_lies_ahead(layout, dt):
     rng = np.random.default_rng(0)
     before, motion = motion_of(layout, rng), motion_of(layout, rng)
-    expected = layout.gap(motion, layout.ahead(before, dt))
-    for found, wanted in zip(layout.departure(motion, before, dt), expected, strict=False):
+    expected = layout.relative_motion(motion, layout.extrapolate(before, dt))
+    for found, wanted in zip(layout.deviation(motion, before, dt), expected, strict=False):
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-13)
 
 
@@ -26,5 +26,5 @@ def test_rest_stays_and_no_time_changes_nothing():
     layout = Layout((3,), (True,))
     x, velocity, acceleration = motion_of(layout, np.random.default_rng(1))
     still = np.zeros(layout.dim)
-    assert layout.ahead((x, still, still), 0.5)[0] is x
-    assert layout.ahead((x, velocity, acceleration), 0.0)[1] is velocity
+    assert layout.extrapolate((x, still, still), 0.5)[0] is x
+    assert layout.extrapolate((x, velocity, acceleration), 0.0)[1] is velocity
