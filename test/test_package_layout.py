@@ -17,7 +17,7 @@ ROS_MODULES = ("rclpy", "builtin_interfaces", "rcl_interfaces", "std_srvs", "ame
 
 # Floors from the ground up: a folder imports from its own floor's own folder and from below.
 FLOORS: tuple[tuple[str, ...], ...] = (
-    ("arrays", "clock", "errors", "memo", ""),
+    ("arrays", "clock", "compiler", "errors", "memo", ""),
     ("schema",),
     ("team",),
     ("subtasks",),

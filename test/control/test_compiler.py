@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from noninteract_ros.control.fast.kernels import compiler
+from noninteract_ros import compiler
 
 INNER = "from compiler import inner\n\n@inner\ndef value():\n    return {}\n"
 OUTER = (

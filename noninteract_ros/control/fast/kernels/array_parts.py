@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.fast.kernels.compiler import inner
+from noninteract_ros.compiler import inner
 
 Places = NDArray[np.intp]
 MEAN, EDGES, JOINTS = range(3)

@@ -7,7 +7,7 @@ The factor on the left gives the size: of a taller factor or result only the fir
 import math
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.fast.kernels.compiler import inner
+from noninteract_ros.compiler import inner
 
 
 @inner

@@ -4,6 +4,7 @@
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels.array_parts import (
     EDGES,
     MEAN,
@@ -20,7 +21,6 @@ from noninteract_ros.control.fast.kernels.blocks import (
     product,
     solve,
 )
-from noninteract_ros.control.fast.kernels.compiler import FIRST, compiled, inner
 
 
 @compiled

@@ -9,6 +9,7 @@ edges (N - 1, h, s), and own vectors, shape (N, m, s), have the tools' coordinat
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.compiler import FIRST, inner
 from noninteract_ros.control.fast.kernels.array_parts import MixingArrays, Places
 from noninteract_ros.control.fast.kernels.blocks import (
     add,
@@ -18,7 +19,6 @@ from noninteract_ros.control.fast.kernels.blocks import (
     product,
     transposed_product,
 )
-from noninteract_ros.control.fast.kernels.compiler import FIRST, inner
 
 
 @inner

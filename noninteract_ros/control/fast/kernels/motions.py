@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels import rotations
 from noninteract_ros.control.fast.kernels.array_parts import Places
-from noninteract_ros.control.fast.kernels.compiler import FIRST, compiled, inner
 
 
 class Numbers(NamedTuple):

@@ -6,9 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels.array_parts import Places, Plan, own_parts
 from noninteract_ros.control.fast.kernels.blocks import invert, product, transposed_product
-from noninteract_ros.control.fast.kernels.compiler import FIRST, compiled, inner
 
 
 class Tools(NamedTuple):

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.fast.kernels.compiler import inner
+from noninteract_ros.compiler import inner
 from noninteract_ros.subtasks import so3
 
 Quaternion = tuple[float, float, float, float]

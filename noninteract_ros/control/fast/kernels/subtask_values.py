@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels import rotations
 from noninteract_ros.control.fast.kernels.array_parts import (
     MixingArrays,
@@ -14,7 +15,6 @@ from noninteract_ros.control.fast.kernels.array_parts import (
     mixing_parts,
 )
 from noninteract_ros.control.fast.kernels.blocks import invert
-from noninteract_ros.control.fast.kernels.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels.mean_rotation import mean_rotation, put_turning
 from noninteract_ros.control.fast.kernels.mixing import unmix
 from noninteract_ros.control.fast.kernels.robots import Poses, Tools

@@ -8,6 +8,7 @@ sum of all G_k of the mixing, shape (1, h, h).
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels.array_parts import (
     MixingArrays,
     Plan,
@@ -22,7 +23,6 @@ from noninteract_ros.control.fast.kernels.blocks import (
     solve,
     transposed_product,
 )
-from noninteract_ros.control.fast.kernels.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels.mixing import (
     add_mix_rate,
     inverse_squares,

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the functions of this folder become machine code."""
+"""Compilation of functions to machine code, kept until their sources change."""
 
 import hashlib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -13,15 +14,13 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 FIRST = cast(int, np.intp(0))  # A literal would have functions compiled once more.
 
 
-def _stamp() -> bytes:
-    """Digest of all sources here: its functions call each other across files."""
+@cache
+def _stamp(folder: Path) -> bytes:
+    """Digest of all sources of a folder: its functions call each other across files."""
     digest = hashlib.sha256()
-    for file in sorted(Path(__file__).parent.glob("*.py")):
+    for file in sorted(folder.glob("*.py")):
         digest.update(file.read_bytes())
     return digest.digest()
-
-
-_STAMP = _stamp()
 
 
 def compiled(function: Function) -> Function:
@@ -41,7 +40,7 @@ def inner(function: Function) -> Function:
 
 
 def _kept(kernel: Any) -> Any:
-    """The function with its machine code kept until any source in this folder changes.
+    """The function with its machine code kept until any source in its folder changes.
 
     numba alone looks at the function's own file, and would go on with what has changed elsewhere.
     """
@@ -51,5 +50,6 @@ def _kept(kernel: Any) -> Any:
         kernel.enable_caching()
     except RuntimeError:
         return kernel
-    kernel._cache._cache_file._source_stamp = _STAMP
+    folder = Path(kernel.py_func.__code__.co_filename).parent
+    kernel._cache._cache_file._source_stamp = _stamp(folder)
     return kernel
