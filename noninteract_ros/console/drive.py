@@ -104,12 +104,12 @@ class DrivenMotion:
         box = self._subtask.workspace
         if isinstance(held, PagePush):
             rate = self._rate(held, frame)
-            return Rate(box.rate(rate, self._desired.now) if box else rate)
+            return Rate(box.limit_velocity(rate, self._desired.now) if box else rate)
         if held is None:
             return None
         target = self._target(held, anchor, frame)
         still = np.zeros(self._subtask.layout.dim)
-        return Target(box.place(target) if box else target, still)
+        return Target(box.clamp(target) if box else target, still)
 
     def _rate(self, held: PagePush, frame: Array) -> Array:
         subtask, to_frame = self._subtask, so3.matrix(so3.inverse(frame))

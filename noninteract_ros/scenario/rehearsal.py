@@ -60,18 +60,18 @@ class Rehearsal:
         self.simulation = scenario.build_simulation(self.team, self.stack)
         self._felt: str | None = None
         self.link: BilateralLink | None = None
-        self._speakers: list[tuple[str, str, Announcer]] = []
+        self._sources: list[tuple[str, str, Announcer]] = []
         rate = scenario.general.rate
         if human and scenario.haptic:
             device = scenario.build_haptic(self.stack)
             self.link = device if isinstance(device, BilateralLink) else None
-            self._speakers.append((scenario.haptic.subtask, "human", Announcer(device, rate)))
+            self._sources.append((scenario.haptic.subtask, "human", Announcer(device, rate)))
             self._felt = scenario.haptic.subtask if scenario.haptic.hand_mass > 0.0 else None
         if autonomy and scenario.planner:
             planner = scenario.build_planner(self.stack)
-            self._speakers.append((scenario.planner.subtask, "autonomy", Announcer(planner, rate)))
-        for _, _, narrator in self._speakers:
-            narrator.begin(0.0)
+            self._sources.append((scenario.planner.subtask, "autonomy", Announcer(planner, rate)))
+        for _, _, announcer in self._sources:
+            announcer.reset(0.0)
         self._feedback: Array | None = None
         general = scenario.general
         self._telling = max(1, round(rate / general.telemetry_rate))
@@ -87,10 +87,10 @@ class Rehearsal:
     def step(self) -> Tick:
         """One tick: sources, controller, team."""
         now = self.simulation.now
-        for subtask, source, narrator in self._speakers:
+        for subtask, source, announcer in self._sources:
             heard = self.controller.inputs[subtask].sources[source]
             feedback = self._feedback if source == "human" else None
-            for stamp, reference in narrator.speak(now, feedback):
+            for stamp, reference in announcer.announce(now, feedback):
                 if reference is not None:
                     heard.receive(stamp / 1e9, reference, now)
         if self.controller.feels and self.simulation.tick % self._telling == 0:

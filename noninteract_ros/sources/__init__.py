@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sources of references: what leads a subtask."""
+"""Sources of references: the human operator, the autonomous planner and the link between."""

@@ -10,10 +10,10 @@ from noninteract_ros.subtasks.reference import Reference
 
 
 def blend(u: float) -> tuple[float, float, float]:
-    """The quintic from 0 to 1 that starts and ends at rest.
+    """Evaluate the quintic from 0 to 1 that starts and ends at rest.
 
     Args:
-        u: Share of the duration that has passed; clipped to [0, 1].
+        u: Elapsed share of the duration; clipped to [0, 1].
 
     Returns:
         Value, and first and second derivative with respect to `u`.
@@ -27,11 +27,17 @@ def blend(u: float) -> tuple[float, float, float]:
 
 
 class RestToRest:
-    """Rests at the first value, then moves from each value to the next; C2 for all times.
+    """Minimum-jerk moves through a sequence of resting values; C2 for all times.
 
-    Move i leads from `values[i]` to `values[i + 1]`, beginning at `starts[i]` and lasting
+    Move i leads from `values[i]` to `values[i + 1]`. It starts at `starts[i]` and lasts
     `durations[i]`. Moves are in order of time and do not overlap; between them the motion rests.
-    Rotations go the shortest way, about a fixed axis.
+    Rotations take the shortest way, about a fixed axis.
+
+    Args:
+        starts: Start time of each move [s], shape (n,), increasing.
+        durations: Duration of each move [s], shape (n,), positive.
+        values: Resting values, shape (n + 1, size).
+        layout: Layout of a value; plain numbers, if None.
     """
 
     def __init__(
@@ -41,21 +47,13 @@ class RestToRest:
         values: ArrayLike,
         layout: Layout | None = None,
     ) -> None:
-        """Takes moves that were checked.
-
-        Args:
-            starts: Times at which the moves start [s], shape (n,), increasing.
-            durations: Their durations [s], shape (n,), positive.
-            values: Resting values, shape (n + 1, size).
-            layout: Layout of a value; plain numbers, if None.
-        """
         self._starts: Array = np.array(starts, dtype=np.float64)
         self._durations: Array = np.array(durations, dtype=np.float64)
         self._values: Array = np.array(values, dtype=np.float64)
         self._layout = layout or Layout.scalars(self._values.shape[1])
 
     def __call__(self, t: float) -> Reference:
-        """The motion at time `t` [s]."""
+        """Evaluate the motion at time `t` [s]."""
         move = int(np.searchsorted(self._starts, t, side="right")) - 1
         if move < 0:
             return Reference.at_rest(self._values[0], self._layout)
@@ -64,10 +62,10 @@ class RestToRest:
         if value == 1.0:
             return Reference.at_rest(self._values[move + 1], self._layout)
         start = self._values[move]
-        way = self._layout.difference(self._values[move + 1], start)
-        # A rotation vector that keeps its direction changes as the angular velocity says.
+        displacement = self._layout.difference(self._values[move + 1], start)
+        # A rotation vector of constant direction has the angular velocity as its rate.
         return Reference(
-            self._layout.sum(start, value * way),
-            rate / duration * way,
-            curvature / duration**2 * way,
+            self._layout.sum(start, value * displacement),
+            rate / duration * displacement,
+            curvature / duration**2 * displacement,
         )

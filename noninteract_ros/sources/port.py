@@ -1,41 +1,41 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where energy enters and leaves a connection."""
+"""Energy ports of a connection, and projections of efforts onto energy limits."""
 
 import numpy as np
 from scipy.optimize import brentq
 
 from noninteract_ros.arrays import Array
 
-TINY = 1e-300  # keeps a division by what may be zero harmless
+TINY = 1e-300  # Keeps a division by a number that may be zero finite.
 
 
 class Port:
-    """Counts the energy that passes a port, either way by itself.
+    """Energy that has passed a port, counted separately for each direction.
 
     Attributes:
-        taken: Energy that the connection has taken up here, never falling [J].
-        given: Energy that it has given away here, never falling [J].
+        absorbed: Energy that entered the connection here, never falling [J].
+        delivered: Energy that left the connection here, never falling [J].
     """
 
     def __init__(self) -> None:
-        self.taken = self.given = 0.0
+        self.absorbed = self.delivered = 0.0
 
-    def give(self, work: float) -> None:
-        """Notes energy given away [J]; a negative one was taken up."""
+    def add(self, work: float) -> None:
+        """Count energy delivered [J]; negative work is absorbed."""
         if work > 0.0:
-            self.given += work
+            self.delivered += work
         else:
-            self.taken -= work
+            self.absorbed -= work
 
 
-def without_excess(effort: Array, flow: Array, metric: Array, limit: float) -> Array:
-    """The nearest effort whose power on a flow does not exceed a limit.
+def limit_power(effort: Array, flow: Array, metric: Array, limit: float) -> Array:
+    """Return the nearest effort whose power on a flow does not exceed a limit.
 
     Args:
         effort: Force on a given velocity, or velocity against a given force, shape (p,).
         flow: The given velocity or force, shape (p,).
-        metric: Weights that make the flow an effort, shape (p,).
-        limit: Most power [W], not negative.
+        metric: Weights that convert the flow to an effort, shape (p,).
+        limit: Largest power [W], not negative.
     """
     excess = float(effort @ flow) - limit
     if excess <= 0.0:
@@ -44,36 +44,38 @@ def without_excess(effort: Array, flow: Array, metric: Array, limit: float) -> A
     return effort - (excess / max(float(direction @ flow), TINY)) * direction
 
 
-def affordable(effort: Array, way: Array, metric: Array, doubt: float, limit: float) -> Array:
-    """The nearest force whose work stays within a limit wherever the displacement ends.
+def limit_work(
+    effort: Array, displacement: Array, metric: Array, uncertainty: float, limit: float
+) -> Array:
+    """Return the nearest force whose work stays within a limit for every possible displacement.
 
-    The displacement is known up to a doubt d: it lies in the ball |way' - way| <= d. With lengths
-    |way|^2 = way' G way of displacements and |f|^2 = f' G^-1 f of forces, the work is at most
-    f' way + d |f|. That is convex in f, and its Lagrange condition is f (1 + l d / |f|) =
-    effort - l G way: damping l is taken off, then the rest is shortened by l d. The least l >= 0
-    that meets the limit gives the nearest force.
+    The displacement x is known up to an uncertainty r: it lies in the ball |x' - x| <= r. Lengths
+    are |x|^2 = x' G x for displacements and |f|^2 = f' G^-1 f for forces. Then the work is at most
+    f' x + r |f|. This bound is convex in f, and its Lagrange condition is
+    f (1 + l r / |f|) = effort - l G x: damping l is taken off, then the rest is shortened by l r.
+    The least l >= 0 that meets the limit gives the nearest force.
 
     Args:
         effort: Wanted force, shape (p,).
-        way: Expected displacement, shape (p,).
+        displacement: Expected displacement x, shape (p,).
         metric: G, positive, shape (p,).
-        doubt: d, not negative.
-        limit: Most work, not negative.
+        uncertainty: r, not negative.
+        limit: Largest work [J], not negative.
     """
-    drag = metric * way
-    work, size = float(effort @ way), float(effort @ (effort / metric))
-    if work + doubt * np.sqrt(size) <= limit:
+    drag = metric * displacement
+    work, size = float(effort @ displacement), float(effort @ (effort / metric))
+    if work + uncertainty * np.sqrt(size) <= limit:
         return effort
-    length = float(drag @ way)
+    length = float(drag @ displacement)
 
-    def shortened_by(damping: float) -> tuple[float, float]:
-        """Length of what damping leaves, and the share of it that its price in doubt leaves."""
+    def remainder(damping: float) -> tuple[float, float]:
+        """Return the length after damping, and the share of it that remains after shortening."""
         left = float(np.sqrt(max(size - damping * (2.0 * work - damping * length), 0.0)))
-        return left, max(1.0 - damping * doubt / max(left, TINY), 0.0)
+        return left, max(1.0 - damping * uncertainty / max(left, TINY), 0.0)
 
     def excess(damping: float) -> float:
-        left, share = shortened_by(damping)
-        return share * (work - damping * length + doubt * left) - limit
+        left, share = remainder(damping)
+        return share * (work - damping * length + uncertainty * left) - limit
 
     most = 1.0
     while excess(most) > 0.0:
@@ -81,12 +83,12 @@ def affordable(effort: Array, way: Array, metric: Array, doubt: float, limit: fl
         if not np.isfinite(most * most * length):
             return np.zeros_like(effort)
     damping = brentq(excess, 0.0, most)
-    result: Array = shortened_by(damping)[1] * (effort - damping * drag)
+    result: Array = remainder(damping)[1] * (effort - damping * drag)
     return result
 
 
-def shortened(vector: Array, places: Array, longest: float) -> Array:
-    """The vector with some of its places made no longer than a length; 0: any length."""
+def limit_norm(vector: Array, places: Array, longest: float) -> Array:
+    """Scale some components of a vector so that their norm meets a limit; 0 means no limit."""
     length = float(np.linalg.norm(vector[places]))
     if longest <= 0.0 or length <= longest:
         return vector

@@ -285,7 +285,7 @@ def test_a_key_leads_while_it_repeats_and_space_stops(ros: Ros) -> None:
     rates = bench.rates()
     np.testing.assert_allclose(rates, np.tile([0.0, -0.1], (len(rates), 1)))
     keys.strike(" ")
-    until(lambda: not bench.node.dead_man.held(time.monotonic()), "the stop")
+    until(lambda: not bench.node.dead_man.is_held(time.monotonic()), "the stop")
     bench.rests()
     bench.ros.remove(bench.node)
     assert termios.tcgetattr(keys.terminal)[3] == before[3]  # Echo and lines, as they were.

@@ -124,13 +124,13 @@ class _Recording:
         self._account = EnergyCodec(("time", *QUANTITIES))
         self._measured = 0.0
         self._watch = LimitActivity(team.joint_names)
-        self._narrators = []
+        self._sources = []
         if scenario.haptic:
             device = scenario.build_haptic(stack)
-            self._narrators.append((scenario.haptic.subtask, "human", device))
+            self._sources.append((scenario.haptic.subtask, "human", device))
         if scenario.planner:
             planner = scenario.build_planner(stack)
-            self._narrators.append((scenario.planner.subtask, "autonomy", planner))
+            self._sources.append((scenario.planner.subtask, "autonomy", planner))
 
     def _add(self, topic: str, kind: str, time: int, encode: Any, *arrays: np.ndarray) -> None:
         found: list[np.ndarray] | None = list(arrays)
@@ -167,12 +167,12 @@ class _Recording:
         self._writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(message))
 
     def _speak(self, duration: float) -> None:
-        for number, (subtask, source, sampler) in enumerate(self._narrators):
-            narrator = Announcer(sampler, self._rate)
-            narrator.begin(0.0)
+        for number, (subtask, source, sampler) in enumerate(self._sources):
+            announcer = Announcer(sampler, self._rate)
+            announcer.reset(0.0)
             codec = next(codec for codec in self._codecs if codec.name == subtask)
             assert number < 2
-            for time, said in narrator.speak(duration):
+            for time, said in announcer.announce(duration):
                 if said is not None:
                     motion = said.position, said.velocity, said.acceleration
                     self._add(

@@ -91,7 +91,7 @@ class Loop:
                 feedback = self._push()
             self._tick(tick * self._period, feedback)
             self.debt = max(self.debt, -self.device.budget.level)
-            self.least = min(self.least, self.device.port.taken - self.device.port.given)
+            self.least = min(self.least, self.device.port.absorbed - self.device.port.delivered)
         return self
 
     def _push(self) -> Array:
@@ -103,7 +103,7 @@ class Loop:
     def _tick(self, now: float, feedback: Array) -> None:
         self._back.send(now, self.team.packet(feedback))
         for packet in self._back.receive(now):
-            self.device.hear(packet)
+            self.device.receive(packet)
         expected = self._period * self._motion.velocity
         force = self.device.force(self._motion.velocity)
         way, velocity = self._hand(force)
@@ -111,9 +111,9 @@ class Loop:
         self.miss = max(self.miss, float(np.linalg.norm((way - expected) * self._root)))
         place = self._layout.sum(self._motion.position, way)
         self._motion = Reference(place, velocity, np.zeros_like(velocity))
-        self._there.send(now + self._period, self.device.moved(force, way, self._motion))
+        self._there.send(now + self._period, self.device.observe(force, way, self._motion))
         for packet in self._there.receive(now + self._period):
-            self.team.hear(packet)
+            self.team.receive(packet)
         self.team.advance(feedback)
 
 

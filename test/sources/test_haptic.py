@@ -25,7 +25,7 @@ def test_the_papers_operator_needs_only_its_start():
     """The defaults are the paper's motion in absolute time, silent before 4 s."""
     hand = device(start_time=4.0)
     assert hand.sample(3.999) is None
-    assert hand.silent_until(0.0) == 4.0
+    assert hand.next_sample(0.0) == 4.0
     for t in (4.0, 4.001, 11.7):
         np.testing.assert_allclose(hand.sample(t).position, [2 * np.sin(0.79 * t), 1], rtol=1e-14)
 
@@ -46,7 +46,7 @@ def test_other_motions_count_from_the_start(tmp_path):
 
 
 def test_it_speaks_between_start_and_stop_but_for_its_dropouts():
-    """Samples exist exactly where the keys say, and silent_until agrees."""
+    """Samples exist exactly where the keys say, and next_sample agrees."""
     hand = device(
         start_time=0.1,
         stop_time=0.9,
@@ -55,10 +55,10 @@ def test_it_speaks_between_start_and_stop_but_for_its_dropouts():
     )
     spoken = [n for n in range(120) if hand.sample(n / 100) is not None]
     assert spoken == [*range(20, 50), *range(60, 80)]
-    assert hand.silent_until(0.0) == 0.2
-    assert hand.silent_until(0.3) == 0.31
-    assert hand.silent_until(0.49) == 0.6
-    assert hand.silent_until(0.79) == math.inf
+    assert hand.next_sample(0.0) == 0.2
+    assert hand.next_sample(0.3) == 0.31
+    assert hand.next_sample(0.49) == 0.6
+    assert hand.next_sample(0.79) == math.inf
     assert hand.next_update(0.79) == 0.8
 
 

@@ -14,7 +14,7 @@ from noninteract_ros.sources.link.energy_budget import Packet
 from noninteract_ros.sources.link.settings import LinkSettings
 from noninteract_ros.sources.link.time_domain_passivity import ObservedDevice, ObservedTeam
 from noninteract_ros.sources.link.wave_variables import WaveDevice, WaveTeam
-from noninteract_ros.sources.port import affordable, without_excess
+from noninteract_ros.sources.port import limit_power, limit_work
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.reference import Reference
 
@@ -47,9 +47,9 @@ def holds(loop: Loop, settings: LinkSettings) -> None:
     surprise = loop.device.surprise
     assert loop.debt <= surprise + ROUNDING
     assert loop.least >= -(settings.reserve + surprise) - ROUNDING
-    assert loop.device.doubt == pytest.approx(loop.miss)
+    assert loop.device.uncertainty == pytest.approx(loop.miss)
     assert surprise <= loop.force * loop.miss + ROUNDING
-    taken, given = loop.device.port.taken, loop.team.port.given
+    taken, given = loop.device.port.absorbed, loop.team.port.delivered
     assert given <= taken + settings.reserve + ROUNDING
 
 
@@ -64,7 +64,7 @@ def test_no_hand_gets_out_more_than_the_reserve_and_one_tick_s_surprise(
     settings = NETWORKS[name]
     loop = Loop(settings, layout, hand(layout.dim), network(settings)).run(TICKS)
     holds(loop, settings)
-    assert loop.device.port.given > 0.0  # Something was felt.
+    assert loop.device.port.delivered > 0.0  # Something was felt.
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -86,13 +86,13 @@ def test_waves_are_held_to_the_same_bound(hand: Callable[[int], Hand], name: str
     ends = WaveDevice, WaveTeam
     loop = Loop(settings, POSE, hand(6), network(settings), ends=ends).run(TICKS)
     holds(loop, settings)
-    assert loop.device.port.given + loop.device.port.taken > 0.0
+    assert loop.device.port.delivered + loop.device.port.absorbed > 0.0
 
 
 class Trusting(ObservedDevice):
     """A device's end that takes the displacement that its velocity foretells for certain."""
 
-    def _compare(self, force: Array, way: Array) -> None:
+    def _update_uncertainty(self, force: Array, displacement: Array) -> None:
         return None
 
 
@@ -113,7 +113,7 @@ def test_the_surprise_falls_with_the_square_of_the_tick() -> None:
         hand = greedy(2, period, a)
         loop = Loop(settings, PLANE, hand, network(settings), period).run(round(5.0 / period))
         holds(loop, settings)
-        assert loop.device.doubt == pytest.approx(0.5 * a * period**2)
+        assert loop.device.uncertainty == pytest.approx(0.5 * a * period**2)
         assert loop.debt <= loop.force * 0.5 * a * period**2 + ROUNDING
 
 
@@ -129,13 +129,13 @@ def test_the_force_is_the_nearest_that_can_be_paid_for() -> None:
         def worst(force: Array, way: Array = way, doubt: float = doubt) -> float:
             return float(force @ way) + doubt * np.sqrt(float(force @ (force / metric)))
 
-        found = affordable(effort, way, metric, doubt, limit)
+        found = limit_work(effort, way, metric, doubt, limit)
         assert worst(found) <= limit + 1e-9
         if found is effort:
             continue
         cut += 1
         for scale in (0.01, 0.1, 1.0):
-            rival = affordable(found + scale * other, way, metric, doubt, limit)
+            rival = limit_work(found + scale * other, way, metric, doubt, limit)
             assert worst(rival) <= limit + 1e-9
             assert (effort - found) @ ((rival - found) / metric) <= 1e-7
     assert cut > 200
@@ -146,18 +146,18 @@ def test_without_doubt_it_is_the_passivity_controller_s_damping() -> None:
     rng = np.random.default_rng(6)
     metric = np.array([1.0, 0.02])
     for effort, way in rng.normal(size=(50, 2, 2)):
-        found = affordable(effort, way, metric, 0.0, 0.1)
-        np.testing.assert_allclose(found, without_excess(effort, way, metric, 0.1), atol=1e-9)
+        found = limit_work(effort, way, metric, 0.0, 0.1)
+        np.testing.assert_allclose(found, limit_power(effort, way, metric, 0.1), atol=1e-9)
 
 
 def test_with_nothing_to_spend_a_hand_at_rest_feels_nothing_and_a_moving_one_resistance() -> None:
     """Nothing is left: only what is sure to oppose the motion remains."""
     push, metric = np.array([3.0, 1.0]), np.ones(2)
-    np.testing.assert_array_equal(affordable(push, np.zeros(2), metric, 0.1, 0.0), 0.0)
-    found = affordable(push, np.array([-1.0, 0.0]), metric, 0.1, 0.0)
+    np.testing.assert_array_equal(limit_work(push, np.zeros(2), metric, 0.1, 0.0), 0.0)
+    found = limit_work(push, np.array([-1.0, 0.0]), metric, 0.1, 0.0)
     assert found[0] == pytest.approx(3.0, rel=0.1)
     assert found[1] == pytest.approx(1.0, rel=0.1)
-    with_it = affordable(push, np.array([1.0, 0.0]), metric, 0.1, 0.0)
+    with_it = limit_work(push, np.array([1.0, 0.0]), metric, 0.1, 0.0)
     assert with_it @ np.array([1.0, 0.0]) + 0.1 * np.linalg.norm(with_it) <= 1e-12
 
 
@@ -171,9 +171,9 @@ def test_a_device_that_can_do_less_does_not_drive_with_what_is_left() -> None:
 
     device = ObservedDevice(LinkSettings(), np.ones(2), 1e-3, limited)
     velocity = np.array([0.1, 1.0])
-    device.hear(Packet(1, (np.array([5.0, -0.05]),), 0.0, 0.1))
+    device.receive(Packet(1, (np.array([5.0, -0.05]),), 0.0, 0.1))
     force = device.force(velocity)
     assert abs(force[1]) <= 0.1
     assert force @ velocity <= 1e-12
-    device.moved(force, 1e-3 * velocity, Reference.at_rest(np.zeros(2)))
-    assert device.port.given <= 1e-15
+    device.observe(force, 1e-3 * velocity, Reference.at_rest(np.zeros(2)))
+    assert device.port.delivered <= 1e-15

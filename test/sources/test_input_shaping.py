@@ -13,7 +13,7 @@ from noninteract_ros.errors import InputError, ScenarioError
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.schema import load
 from noninteract_ros.sources.human.input_settings import OperatorSettings
-from noninteract_ros.sources.human.input_shaping import DeadMan, OperatorInput, deflection
+from noninteract_ros.sources.human.input_shaping import DeadManSwitch, OperatorInput, deflection
 from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.reference import Reference
 from noninteract_ros.subtasks.subtask import Subtask
@@ -67,23 +67,23 @@ def pose(*position: float, turn: Array = LEVEL) -> Array:
 
 def test_silence_lets_go_until_it_is_taken_hold_of_anew() -> None:
     """A device that comes back with the button still pressed leads nobody."""
-    switch = DeadMan(0.25)
-    switch.note(0.0, held=True)
-    assert switch.held(0.25)
-    assert not switch.held(0.26)
-    switch.note(0.3, held=True)
-    assert not switch.held(0.3)
-    switch.note(0.4, held=False)
-    switch.note(0.5, held=True)
-    assert switch.held(0.5)
+    switch = DeadManSwitch(0.25)
+    switch.update(0.0, held=True)
+    assert switch.is_held(0.25)
+    assert not switch.is_held(0.26)
+    switch.update(0.3, held=True)
+    assert not switch.is_held(0.3)
+    switch.update(0.4, held=False)
+    switch.update(0.5, held=True)
+    assert switch.is_held(0.5)
 
 
 def test_a_gap_lets_go_even_if_nobody_asked_meanwhile() -> None:
     """The next message after a silence finds the switch let go."""
-    switch = DeadMan(0.25)
-    switch.note(0.0, held=True)
-    switch.note(1.0, held=True)
-    assert not switch.held(1.0)
+    switch = DeadManSwitch(0.25)
+    switch.update(0.0, held=True)
+    switch.update(1.0, held=True)
+    assert not switch.is_held(1.0)
 
 
 def test_deflections_are_zero_in_the_dead_zone_continuous_and_odd() -> None:

@@ -30,21 +30,21 @@ def test_the_papers_formation_is_held_for_good():
 
 
 def test_nothing_is_asked_before_the_first_formation():
-    """Before its time there is no reference, and silent_until says when there will be."""
+    """Before its time there is no reference, and next_sample says when there will be."""
     plan = planner(Formation(WIDE, time=1.5))
     assert plan.sample(1.49) is None
-    assert plan.silent_until(0.0) == 1.5
-    assert plan.silent_until(1.5) == 1.51
+    assert plan.next_sample(0.0) == 1.5
+    assert plan.next_sample(1.5) == 1.51
     assert plan.next_update(0.0) == 0.01
     np.testing.assert_array_equal(plan.sample(1.5).position, WIDE)
 
 
 @pytest.mark.parametrize("rate", [100.0, 30.0, 7.0])
 def test_there_is_a_reference_wherever_silence_ends(rate):
-    """silent_until and reference agree for starts on and off the grid."""
+    """next_sample and reference agree for starts on and off the grid."""
     for start in [*np.random.default_rng(4).uniform(0.0, 3.0, 50).tolist(), 1 / 3, 0.1 + 0.2]:
         plan = planner(Formation(WIDE, time=start), rate=rate)
-        first = plan.silent_until(-1.0)
+        first = plan.next_sample(-1.0)
         assert plan.sample(first) is not None
         assert plan.sample(first - 1.0 / rate) is None
 

@@ -20,14 +20,14 @@ def test_next_update_walks_the_grid_without_drift():
 
 @pytest.mark.parametrize("rate", [1000.0, 100.0, 30.0])
 def test_silence_ends_at_the_first_spoken_instant(rate):
-    """No spoken instant lies before silent_until, and one lies there."""
+    """No spoken instant lies before next_sample, and one lies there."""
     schedule = Schedule(rate, [(0.5, 1.0), (1.2, 1.201), (1.5, 2.0)])
     spoken = [n for n in range(int(3 * rate)) if schedule.window(n) is not None]
     for n in range(int(2.5 * rate)):
         later = [m for m in spoken if m > n]
         expected = later[0] / rate if later else math.inf
-        assert schedule.silent_until(n / rate) == expected
-        assert schedule.silent_until((n + 0.5) / rate) == expected
+        assert schedule.next_sample(n / rate) == expected
+        assert schedule.next_sample((n + 0.5) / rate) == expected
 
 
 def test_windows_begin_included_and_end_excluded():

@@ -10,7 +10,7 @@ from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import load
 from noninteract_ros.sources.autonomy.planner import Formation, FormationPlanner, PlannerSettings
 from noninteract_ros.sources.human import motion as motions
-from noninteract_ros.sources.human.hand import Hand, TurningHand
+from noninteract_ros.sources.human.hand import Hand, RotatingHand
 from noninteract_ros.sources.human.haptic_device import HapticDevice, HapticSettings
 from noninteract_ros.sources.human.replay import replay
 from noninteract_ros.subtasks import so3
@@ -141,15 +141,15 @@ def test_formations_of_poses_are_reached_and_held():
     assert motion(2.0).velocity.shape == (12,)
 
 
-def turning_hand(period: float = 0.001) -> TurningHand:
-    return TurningHand(
+def rotating_hand(period: float = 0.001) -> RotatingHand:
+    return RotatingHand(
         Hand(0.8, 6.0, 150.0, period, dim=3), Hand(0.01, 0.05, 3.0, period, dim=3), POSE
     )
 
 
-def test_a_turning_hand_follows_its_equation_of_motion():
+def test_a_rotating_hand_follows_its_equation_of_motion():
     """I phi'' + d phi' + k phi = A(phi)' torque, by fine integration; places as ever."""
-    hand, period = turning_hand(), 0.001
+    hand, period = rotating_hand(), 0.001
     force = np.array([3.0, -1.0, 2.0, 1.2, -0.8, 1.5])
     hand.advance(force, 400)
 
@@ -165,9 +165,9 @@ def test_a_turning_hand_follows_its_equation_of_motion():
     np.testing.assert_array_equal(found.position[:3], straight.deviation(force[:3]).position)
 
 
-def test_without_force_a_turning_hand_stays_on_the_intended_motion():
+def test_without_force_a_rotating_hand_stays_on_the_intended_motion():
     """The intended motion comes out, up to rounding."""
-    hand = turning_hand()
+    hand = rotating_hand()
     hand.advance(np.zeros(6), 50)
     aim = motions_that_turn()["swing"](0.7)
     device_motion = hand.deflect(aim, np.zeros(6))
@@ -227,7 +227,7 @@ def test_a_subtask_that_only_turns_has_no_circle():
     """A circle is in the plane of two coordinates."""
     with pytest.raises(ScenarioError, match=r"haptic\.motion: found circle, .* has 0"):
         device(TURN, motion="circle")
-    turned = motions.turning(
+    turned = motions.with_rotation(
         motions.still([]), motions.swing([0.1, 0.2, 0.3], 1.0, [0.0] * 3), NONE, TURN
     )
     assert turned(0.3).position.shape == (4,)

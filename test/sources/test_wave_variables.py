@@ -25,10 +25,10 @@ def test_power_at_the_device_is_that_of_its_waves() -> None:
     device = WaveDevice(RICH, METRIC, PERIOD)
     for number in range(20):
         wave, velocity = rng.normal(size=(2, 6))
-        device.hear(Packet(number, (wave,), 50.0, 50.0))
+        device.receive(Packet(number, (wave,), 50.0, 50.0))
         force = device.force(velocity)
         motion = Reference(POSE.identity, velocity, np.zeros(6))
-        sent = device.moved(force, PERIOD * velocity, motion).signals[1]
+        sent = device.observe(force, PERIOD * velocity, motion).signals[1]
         assert -force @ velocity == pytest.approx(0.5 * (sent @ sent - wave @ wave))
 
 
@@ -41,7 +41,7 @@ def test_power_at_the_team_is_that_of_its_waves() -> None:
         wave, feedback = rng.normal(size=(2, 6))
         for number in range(300):
             place = team._now.position  # Nothing to catch up with.
-            team.hear(Packet(number, (place, wave), 50.0, 50.0))
+            team.receive(Packet(number, (place, wave), 50.0, 50.0))
             velocity = team.advance(feedback).velocity
         (back,) = team.packet(feedback).signals
         assert -feedback @ velocity == pytest.approx(0.5 * (wave @ wave - back @ back), rel=1e-4)
@@ -55,13 +55,13 @@ def test_a_matched_team_sends_nothing_back_and_the_hand_feels_the_impedance() ->
     place, reference = POSE.identity, start
     for _ in range(400):
         feedback = -30.0 * METRIC * reference.velocity
-        device.hear(team.packet(feedback))
+        device.receive(team.packet(feedback))
         force = device.force(velocity)
         place = POSE.sum(place, PERIOD * velocity)
         motion = Reference(place, velocity, np.zeros(6))
-        packet = device.moved(force, PERIOD * velocity, motion)
+        packet = device.observe(force, PERIOD * velocity, motion)
         # The wave alone: the place that the team has.
-        team.hear(packet._replace(signals=(reference.position, packet.signals[1])))
+        team.receive(packet._replace(signals=(reference.position, packet.signals[1])))
         reference = team.advance(feedback)
     np.testing.assert_allclose(reference.velocity, velocity, atol=1e-3)
     np.testing.assert_allclose(force, -30.0 * METRIC * velocity, atol=0.02)

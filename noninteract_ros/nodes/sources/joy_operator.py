@@ -29,7 +29,7 @@ class JoyOperator(OperatorNode):
     def _on_joy(self, message: Joy) -> None:
         stick, held = self._mapping.read(message.axes, message.buttons)
         self._stick = stick
-        self.dead_man.note(time.monotonic(), held)
+        self.dead_man.update(time.monotonic(), held)
 
     def lead(self, now: float, desired: Reference) -> None:
         """A rate in proportion to the deflection."""

@@ -58,7 +58,7 @@ class KeyboardOperator(OperatorNode):
                     self.context.try_shutdown()
                     return
                 self._keys.press(key, now)
-        self.dead_man.note(now, bool(self._keys.stick(now).any()))
+        self.dead_man.update(now, bool(self._keys.stick(now).any()))
 
     def lead(self, now: float, desired: Reference) -> None:
         """A rate in the directions of the keys."""

@@ -15,7 +15,7 @@ from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.nodes.messages.messages import Level, ParsedReference, SubtaskCodec
 from noninteract_ros.nodes.sources.operator_messages import OperatorCodec
 from noninteract_ros.sources.human.input_settings import OperatorSettings
-from noninteract_ros.sources.human.input_shaping import DeadMan, OperatorInput
+from noninteract_ros.sources.human.input_shaping import DeadManSwitch, OperatorInput
 from noninteract_ros.subtasks.reference import Reference
 
 BOUNDS = ("max_velocity", "max_acceleration", "max_jerk")
@@ -49,7 +49,7 @@ class OperatorNode(ScenarioNode):
         led = self.scenario.subtasks[subtask].input
         limits = np.array([spread(task, name, getattr(led, name)) for name in BOUNDS])
         self.input = OperatorInput(self.settings, task, limits)
-        self.dead_man = DeadMan(self.settings.hold_timeout)
+        self.dead_man = DeadManSwitch(self.settings.hold_timeout)
         self._codec = SubtaskCodec(subtask, task.elements, task.axes, task.rotates)
         self._sayings = OperatorCodec(task)
         self._desired: bytes | None = None
@@ -86,7 +86,7 @@ class OperatorNode(ScenarioNode):
 
     def _on_timer(self) -> None:
         now = time.monotonic()
-        desired = self.desired() if self.dead_man.held(now) else None
+        desired = self.desired() if self.dead_man.is_held(now) else None
         if desired is not None:
             try:
                 self.lead(now, desired)
@@ -122,7 +122,7 @@ class OperatorNode(ScenarioNode):
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
         """Whether the device is held and the team is there."""
-        held = self.dead_man.held(time.monotonic())
+        held = self.dead_man.is_held(time.monotonic())
         values: dict[str, object] = {
             "leads": self.settings.subtask,
             "messages sent": self._sent,

@@ -17,7 +17,7 @@ from noninteract_ros.nodes.messages.cdr import check_finite
 from noninteract_ros.nodes.messages.messages import POSE, check_rotations, flat
 from noninteract_ros.nodes.sources.operator_node import OperatorNode
 from noninteract_ros.sources.human.input_settings import TrackerSettings
-from noninteract_ros.sources.human.input_shaping import DeadMan
+from noninteract_ros.sources.human.input_shaping import DeadManSwitch
 from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.reference import Reference
@@ -36,7 +36,7 @@ class PoseOperator(OperatorNode):
         self._largest_jump = settings.largest_jump
         self._mounting = _mounting(settings)
         self._button = settings.clutch_button
-        self._clutch, self._pressed = False, DeadMan(self.settings.hold_timeout)
+        self._clutch, self._pressed = False, DeadManSwitch(self.settings.hold_timeout)
         self._pose: Array | None = None
         self.subscribe(PoseStamped, settings.pose_topic, self._on_pose)
         if settings.clutch_topic:
@@ -49,7 +49,7 @@ class PoseOperator(OperatorNode):
 
     def _on_joy(self, message: Joy) -> None:
         there = len(message.buttons) > self._button
-        self._pressed.note(time.monotonic(), there and bool(message.buttons[self._button]))
+        self._pressed.update(time.monotonic(), there and bool(message.buttons[self._button]))
 
     def _on_pose(self, message: PoseStamped) -> None:
         pose = flat(message.pose.position, message.pose.orientation)
@@ -64,13 +64,13 @@ class PoseOperator(OperatorNode):
         )
         before, self._pose = self._pose, pose
         now = time.monotonic()
-        held = self._clutch or self._pressed.held(now)
-        if before is not None and self.dead_man.held(now):
+        held = self._clutch or self._pressed.is_held(now)
+        if before is not None and self.dead_man.is_held(now):
             way = float(np.linalg.norm(pose[:3] - before[:3]))
             if way > self._largest_jump:
-                self.dead_man.lapse()
+                self.dead_man.release()
                 raise InputError(f"the pose jumped by {way:.3g} m: the clutch lets go")
-        self.dead_man.note(now, held)
+        self.dead_man.update(now, held)
 
     def lead(self, now: float, desired: Reference) -> None:
         """A set-point that is as far from where the clutch was taken as the device is."""

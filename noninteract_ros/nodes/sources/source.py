@@ -45,7 +45,7 @@ class SourceNode(ScenarioNode):
         self._codec = SubtaskCodec(subtask, task.elements, task.axes, task.rotates)
         self._joints = JointStateCodec(team.joint_names)
         self._rate, self._update_rate = self.scenario.general.rate, update_rate
-        self._narrator = Announcer(sampler, self._rate)
+        self._announcer = Announcer(sampler, self._rate)
         self._order, self._lead = StampOrder(), state_lead(self._rate)
         self._began: int | None = None
         self._stamp = -1
@@ -70,7 +70,7 @@ class SourceNode(ScenarioNode):
         self._words = [(until, words) for until, words in self._words if until >= stamp]
         if self._began is None:
             self._began = stamp
-            self._narrator.begin(seconds(stamp))
+            self._announcer.reset(seconds(stamp))
             if self.lockstep:
                 self._speak(seconds(stamp))
         self._stamp = stamp
@@ -100,7 +100,7 @@ class SourceNode(ScenarioNode):
 
     def _speak(self, until: float) -> None:
         feedback = self._feedback if self._feels else None
-        for stamp, reference in self._narrator.speak(until, feedback):
+        for stamp, reference in self._announcer.announce(until, feedback):
             if reference is None:
                 words = self._codec.encode_marker(stamp)
             else:

@@ -81,7 +81,7 @@ def _unforeseen(
         return found  # In wall time a source counts from when it was started.
     foreseen, following = set(), -0.5 / recorded.rate
     last = seconds(stamp(series.stamps.max()))
-    while (following := sampler.silent_until(following)) <= last:
+    while (following := sampler.next_sample(following)) <= last:
         foreseen.add(stamp(following))
     stamps = np.round(series.stamps * 1e9).astype(np.int64).tolist()
     if not foreseen.issuperset(stamps):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The autonomy that plans the relative subtask: formations and the changes between them."""
+"""Autonomous planner of the relative subtask: formations and the transitions between them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ from noninteract_ros.subtasks.reference import Reference
 
 @dataclass(frozen=True)
 class PlannerSettings:
-    """The block `planner` of a scenario; each formation has a block of its own inside it."""
+    """Block `planner` of a scenario; each formation has a block of its own inside it."""
 
     subtask: str = key("Subtask that the planner commands", "relative")
     update_rate: float = key("Rate of its references [Hz]", 100.0, positive=True)
@@ -28,19 +28,30 @@ class PlannerSettings:
 
 @dataclass(frozen=True)
 class Formation:
-    """A value of the relative subtask and when it is to be taken."""
+    """Value of the relative subtask and the time of its transition."""
 
     value: tuple[float, ...] = key(
         "Value of the subtask, element after element [m], each with its quaternion x, y, z, w"
     )
-    time: float = key("Time at which the change to it starts [s]", 0.0, minimum=0.0)
-    duration: float = key("Duration of the change [s]; 0 for the first one", 0.0, minimum=0.0)
+    time: float = key("Start time of the transition to it [s]", 0.0, minimum=0.0)
+    duration: float = key("Duration of the transition [s]; 0 for the first one", 0.0, minimum=0.0)
 
 
 class FormationPlanner:
-    """Holds each formation and changes to the next with minimum jerk.
+    """Sequence of formations with minimum-jerk transitions.
 
     Times count from the start of the run.
+
+    Args:
+        settings: Names and order of the formations.
+        formations: Formation of each name.
+        layout: Layout of the commanded subtask's values.
+        path: Dotted key of the block, for error messages.
+
+    Raises:
+        ScenarioError: No formation is listed, or one has no block, the wrong size, an invalid
+            quaternion, a time out of order or inside the transition before it, or no duration
+            although it is not the first.
     """
 
     def __init__(
@@ -50,19 +61,6 @@ class FormationPlanner:
         layout: Layout,
         path: str = "planner",
     ) -> None:
-        """Checks the formations against each other and the subtask.
-
-        Args:
-            settings: Names and order of the formations.
-            formations: The formation of each name.
-            layout: Layout of the commanded subtask's values.
-            path: Dotted key of the block, for error messages.
-
-        Raises:
-            ScenarioError: No formation, one without a block, of another size, with a quaternion
-                that is none, out of order, overlapping the one before, or taken at once where it
-                is not the first.
-        """
         if not settings.formations:
             raise ScenarioError(join(path, "formations"), "an empty list", "1 or more names")
         for name in settings.formations:
@@ -81,21 +79,21 @@ class FormationPlanner:
         self._schedule = Schedule(settings.update_rate, [(self._start, math.inf)])
 
     def sample(self, t: float, feedback: Array | None = None) -> Reference | None:
-        """The planned motion at time `t` [s]; None before the first formation.
+        """Return the planned motion at time `t` [s]; None before the first formation.
 
-        Autonomy feels no feedback; the argument is there to be sampled as a hand is.
+        The feedback has no effect on a planner; the argument belongs to the interface `Sampler`.
         """
         if t < self._start - TOLERANCE / self._schedule.rate:
             return None
         return self._motion(t)
 
     def next_update(self, t: float) -> float:
-        """The first update instant later than `t` [s], spoken or not."""
+        """Return the first update instant after `t` [s], with or without a reference."""
         return self._schedule.next_update(t)
 
-    def silent_until(self, t: float) -> float:
-        """The first update instant later than `t` [s] for which there is a reference."""
-        return self._schedule.silent_until(t)
+    def next_sample(self, t: float) -> float:
+        """Return the first update instant after `t` with a reference [s]."""
+        return self._schedule.next_sample(t)
 
 
 def _value(path: str, block: Formation, layout: Layout) -> Array:

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From what a person does with a device to rates and set-points of a subtask.
+"""Conversion of an operator's device inputs to velocities and set-points of a subtask.
 
-Velocity, acceleration and jerk are bounded where rates and set-points become references
-(`control/desired.py`), from the motion that the subtask has: so taking over, letting go and taking
-hold again never jump. What belongs to the person is here: scaling, the dead-man's switch, the
-clutch, and the box beyond which nobody can lead.
+This module holds the operator's part: scaling, dead-man's switch, clutch and workspace. Velocity,
+acceleration and jerk are bounded later, where velocities and set-points become references
+(`control/references/desired_motion.py`). Those start from the subtask's current motion, so that
+take-over, release and re-engagement never jump.
 """
 
 import numpy as np
@@ -18,56 +18,58 @@ from noninteract_ros.subtasks.reference import Reference
 from noninteract_ros.subtasks.subtask import Subtask
 
 AXES = ("x", "y", "z")
-LATENCY = 0.06  # [s] between a place that was heard of and the rate that takes it into account
+LATENCY = 0.06  # Age [s] of a received position when the velocity computed from it acts.
 
 
-class DeadMan:
-    """Whether something is held; silence lets go, and then it has to be taken hold of anew.
+class DeadManSwitch:
+    """Dead-man's switch with a timeout.
+
+    After a timeout the switch has to be released and held again.
 
     Args:
-        timeout: Silence that lets go [s].
+        timeout: Time without updates after which the switch is released [s].
     """
 
     def __init__(self, timeout: float) -> None:
         self._timeout = timeout
-        self._held = self._lapsed = False
-        self._heard = -np.inf
+        self._held = self._locked = False
+        self._updated = -np.inf
 
-    def note(self, now: float, held: bool) -> None:
-        """The device says at a time [s] whether it is held."""
-        self.held(now)
-        self._heard = now
-        self._lapsed = self._lapsed and held
-        self._held = held and not self._lapsed
+    def update(self, now: float, held: bool) -> None:
+        """Update with the device's state at a time [s]."""
+        self.is_held(now)
+        self._updated = now
+        self._locked = self._locked and held
+        self._held = held and not self._locked
 
-    def held(self, now: float) -> bool:
-        """Whether it is held at a time [s]."""
-        if self._held and now - self._heard > self._timeout:
-            self.lapse()
+    def is_held(self, now: float) -> bool:
+        """Return True if the switch is held at a time [s]."""
+        if self._held and now - self._updated > self._timeout:
+            self.release()
         return self._held
 
-    def lapse(self) -> None:
-        """Lets go until it is let go and taken hold of anew."""
-        self._held, self._lapsed = False, True
+    def release(self) -> None:
+        """Release the switch until the device has released it and holds it again."""
+        self._held, self._locked = False, True
 
 
 def deflection(value: Array, deadzone: float, exponent: float) -> Array:
-    """Deflections within -1 and 1, zero in the dead zone and continuous at its edge."""
+    """Shape deflections to [-1, 1], zero in the dead zone and continuous at its edge."""
     size = np.clip((np.abs(value) - deadzone) / (1.0 - deadzone), 0.0, 1.0)
     return np.sign(value) * size**exponent
 
 
 class Workspace:
-    """The box of plain coordinates that an operator can lead to.
+    """Box of translational coordinates that the operator can command.
 
     Args:
-        settings: The operator's block.
-        subtask: What is led.
+        settings: Block `operator`.
+        subtask: Commanded subtask.
         limits: Bounds of its velocity, acceleration and jerk, shape (3, p).
         path: Dotted key of the block, for error messages.
 
     Raises:
-        ScenarioError: The box has another size than the subtask.
+        ScenarioError: The box does not have the subtask's number of coordinates.
     """
 
     def __init__(
@@ -87,48 +89,48 @@ class Workspace:
         self._limits = limits[:, layout.rates]
         self._latency = LATENCY + 1.0 / settings.update_rate
 
-    def place(self, value: Array) -> Array:
-        """The nearest value in the box, shape (size,)."""
+    def clamp(self, value: Array) -> Array:
+        """Return the nearest value in the box, shape (size,)."""
         found = value.copy()
         found[self._values] = np.clip(value[self._values], self._lower, self._upper)
         return found
 
-    def rate(self, velocity: Array, now: Reference) -> Array:
-        """A velocity that comes to rest within the box, shape (p,).
+    def limit_velocity(self, velocity: Array, now: Reference) -> Array:
+        """Limit a velocity so that the motion comes to rest within the box, shape (p,).
 
-        From the velocity u, braked with a within the jerk j, rest takes no more way than
-        u^2 / (2 a) + u a / (2 j), and what happens before that takes a latency, in which an
-        acceleration b that there is goes on; it ends no sooner than after b / j. For a stands
-        half of the bound, and the latency counts twice: the motion lags behind this curve.
+        Braking from the velocity u with the acceleration a and the jerk j takes a distance of at
+        most u^2 / (2 a) + u a / (2 j). Before that a latency passes, during which a present
+        acceleration b continues; it ends no sooner than after b / j. Half of the acceleration
+        bound is used for a, and the latency counts twice, since the motion lags behind this curve.
 
         Args:
-            velocity: What is asked for, shape (p,).
-            now: Desired motion as it was heard of.
+            velocity: Commanded velocity, shape (p,).
+            now: Desired motion as last received.
         """
         found, here = velocity.copy(), now.position[self._values]
         a, j = 0.5 * self._limits[1], self._limits[2]
         c = 0.5 * a / j + 2.0 * self._latency
 
-        def fastest(way: Array, b: Array) -> Array:
-            end = a * (np.sqrt(c * c + 2.0 * np.maximum(way, 0.0) / a) - c)
+        def fastest(distance: Array, b: Array) -> Array:
+            end = a * (np.sqrt(c * c + 2.0 * np.maximum(distance, 0.0) / a) - c)
             b = np.maximum(b, 0.0)
             return np.maximum(end - b * self._latency - 0.5 * b * b / j, 0.0)
 
-        growth = now.acceleration[self._rates]
+        acceleration = now.acceleration[self._rates]
         found[self._rates] = np.clip(
             velocity[self._rates],
-            -fastest(here - self._lower, -growth),
-            fastest(self._upper - here, growth),
+            -fastest(here - self._lower, -acceleration),
+            fastest(self._upper - here, acceleration),
         )
         return found
 
 
 class OperatorInput:
-    """Sticks and poses of a person as rates and set-points of a subtask of one element.
+    """Velocities and set-points of a one-element subtask from an operator's sticks and poses.
 
     Args:
-        settings: The operator's block.
-        subtask: What is led.
+        settings: Block `operator`.
+        subtask: Commanded subtask.
         limits: Bounds of its velocity, acceleration and jerk, shape (3, p).
         path: Dotted key of the block, for error messages.
 
@@ -148,48 +150,48 @@ class OperatorInput:
         self._anchor: tuple[Array, Array] | None = None
 
     def rate(self, stick: Array, now: Reference) -> Array:
-        """Velocity of the subtask, shape (p,).
+        """Return the velocity of the subtask, shape (p,).
 
         Args:
-            stick: Deflections along x, y, z and about them, shape (6,), in world axes.
+            stick: Deflections along and about x, y, z, shape (6,), in world axes.
             now: Desired motion of the subtask.
         """
         velocity = np.empty(self._layout.dim)
         velocity[self._layout.rates] = self._settings.linear_speed * stick[self._places]
         velocity[self._layout.angular] = self._settings.angular_speed * stick[3:]
-        return self._workspace.rate(velocity, now)
+        return self._workspace.limit_velocity(velocity, now)
 
     @property
     def clutched(self) -> bool:
-        """Whether the device has been taken hold of."""
+        """True while the clutch is engaged."""
         return self._anchor is not None
 
     def engage(self, pose: Array, value: Array) -> None:
-        """Takes hold: from here on the subtask moves as the device does.
+        """Engage the clutch: couple the subtask's motion to the device's from here on.
 
         Args:
-            pose: Of the device, position and quaternion in world axes, shape (7,).
-            value: Where the subtask is led to now, shape (size,).
+            pose: Pose of the device, position and quaternion in world axes, shape (7,).
+            value: Desired value of the subtask now, shape (size,).
         """
         self._anchor = pose, value
 
     def release(self) -> None:
-        """Lets go."""
+        """Release the clutch."""
         self._anchor = None
 
     def target(self, pose: Array) -> Array:
-        """Where the device leads the subtask, shape (size,).
+        """Return the set-point of the subtask for a pose of the device, shape (size,).
 
         Raises:
-            InputError: Nobody has taken hold.
+            InputError: The clutch is not engaged.
         """
         if self._anchor is None:
-            raise InputError("the clutch is not held")
+            raise InputError("the clutch is not engaged")
         start, value = self._anchor
         gap = np.empty(self._layout.dim)
-        way = self._settings.linear_scale * (pose[:3] - start[:3])
-        gap[self._layout.rates] = way[self._places]
+        displacement = self._settings.linear_scale * (pose[:3] - start[:3])
+        gap[self._layout.rates] = displacement[self._places]
         if self._layout.rotates:
-            turn = so3.log(so3.product(pose[3:], so3.inverse(start[3:])))
-            gap[self._layout.angular] = self._settings.angular_scale * turn
-        return self._workspace.place(self._layout.sum(value, gap))
+            rotation = so3.log(so3.product(pose[3:], so3.inverse(start[3:])))
+            gap[self._layout.angular] = self._settings.angular_scale * rotation
+        return self._workspace.clamp(self._layout.sum(value, gap))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The motion that a hand intends, from the keys of a scenario."""
+"""Intended motion of the hand, built from the keys of a scenario."""
 
 from itertools import pairwise
 
@@ -16,7 +16,7 @@ from noninteract_ros.subtasks.layout import Layout
 
 
 def intended_motion(settings: HapticSettings, layout: Layout, path: str) -> Trajectory:
-    """The hand's motion over the time of the run, with its tremor.
+    """Build the hand's motion over the time of the run, with its tremor.
 
     Args:
         settings: The device and its motion.
@@ -24,7 +24,7 @@ def intended_motion(settings: HapticSettings, layout: Layout, path: str) -> Traj
         path: Dotted key of the block, for error messages.
 
     Raises:
-        ScenarioError: A key does not fit the others, the subtask or the file it names.
+        ScenarioError: A key does not fit the other keys, the subtask or the file it names.
     """
     builders = {
         "paper": _swing,
@@ -46,26 +46,30 @@ def intended_motion(settings: HapticSettings, layout: Layout, path: str) -> Traj
 def _swing(settings: HapticSettings, layout: Layout, path: str) -> Trajectory:
     amplitude = _vector(settings.amplitude, layout, join(path, "amplitude"))
     offset = _vector(settings.offset, layout, join(path, "offset"))
-    place = motions.swing(amplitude, settings.frequency, offset)
+    translation = motions.swing(amplitude, settings.frequency, offset)
     if not layout.rotates:
-        return place
-    rotation = _rotation(settings, layout, path)
-    turn = motions.swing(rotation, settings.frequency, np.zeros_like(rotation))
-    return motions.turning(place, turn, _orientation(settings, layout, path), layout)
+        return translation
+    angles = _rotation(settings, layout, path)
+    rotation = motions.swing(angles, settings.frequency, np.zeros_like(angles))
+    return motions.with_rotation(
+        translation, rotation, _orientation(settings, layout, path), layout
+    )
 
 
 def _circle(settings: HapticSettings, layout: Layout, path: str) -> Trajectory:
-    plain = layout.rates.size
-    if plain < 2:
-        allowed = f"a subtask of 2 or more coordinates; {settings.subtask} has {plain}"
+    count = layout.rates.size
+    if count < 2:
+        allowed = f"a subtask of 2 or more coordinates; {settings.subtask} has {count}"
         raise ScenarioError(join(path, "motion"), "circle", allowed)
     centre = _vector(settings.centre, layout, join(path, "centre"))
     pace = settings.frequency, settings.ramp_time
-    place = motions.circle(centre, settings.radius, *pace)
+    translation = motions.circle(centre, settings.radius, *pace)
     if not layout.rotates:
-        return place
-    turn = motions.rocking(_rotation(settings, layout, path), *pace)
-    return motions.turning(place, turn, _orientation(settings, layout, path), layout)
+        return translation
+    rotation = motions.rocking(_rotation(settings, layout, path), *pace)
+    return motions.with_rotation(
+        translation, rotation, _orientation(settings, layout, path), layout
+    )
 
 
 def _still(settings: HapticSettings, layout: Layout, path: str) -> Trajectory:
@@ -122,7 +126,7 @@ def _rotation(settings: HapticSettings, layout: Layout, path: str) -> Array:
 
 
 def _orientation(settings: HapticSettings, layout: Layout, path: str) -> Array:
-    """Quaternions that the motion holds or swings about, shape (r, 4)."""
+    """Return the orientations that the motion holds or oscillates about, shape (r, 4)."""
     where, shape = join(path, "orientation"), layout.quaternions.shape
     if not settings.orientation:
         return layout.identity[layout.quaternions]
@@ -130,7 +134,7 @@ def _orientation(settings: HapticSettings, layout: Layout, path: str) -> Array:
 
 
 def _quaternions(numbers: tuple[float, ...], shape: tuple[int, ...], path: str) -> Array:
-    """Unit quaternions of some shape (..., 4) from numbers in sequence."""
+    """Return unit quaternions of a shape (..., 4) from a sequence of numbers."""
     count = int(np.prod(shape))
     if len(numbers) != count:
         allowed = f"{count} numbers, x, y, z, w of {count // 4} quaternions"

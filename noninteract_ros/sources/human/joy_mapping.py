@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the axes and buttons of a Joy message mean."""
+"""Mapping of the axes and buttons of a Joy message to deflections."""
 
 import re
 from collections.abc import Sequence
@@ -18,17 +18,17 @@ Terms = list[tuple[float, str, int]]
 
 
 class JoyMapping:
-    """Deflections in six directions, and whether the device is held.
+    """Mapping to deflections in six directions and to the state of the dead-man's switch.
 
-    Drivers may leave out buttons that are not pressed (that of space mice does); axes that are
-    missing mean that the mapping belongs to another device.
+    Drivers may omit buttons that are not pressed, as that of space mice does. Missing axes mean
+    that the mapping belongs to another device.
 
     Args:
         settings: The block `joy`.
-        path: Its dotted key, for error messages.
+        path: Dotted key of the block, for error messages.
 
     Raises:
-        ScenarioError: A direction is no sum of axes and buttons.
+        ScenarioError: A direction is not a sum of axes and buttons.
     """
 
     def __init__(self, settings: JoySettings, path: str = "joy") -> None:
@@ -40,12 +40,14 @@ class JoyMapping:
         )
 
     def read(self, axes: Sequence[float], buttons: Sequence[int]) -> tuple[Array, bool]:
-        """Deflections along x, y, z and about them, shape (6,), and whether it is held.
+        """Convert a message to deflections and the state of the dead-man's switch.
 
-        Without an enable button it is held while it is deflected.
+        Returns:
+            Deflections along and about x, y, z, shape (6,), and True if the switch is held.
+            Without an enable button it is held while a deflection is not zero.
 
         Raises:
-            InputError: Too few axes, or one that is no number.
+            InputError: There are too few axes, or one is not finite.
         """
         if len(axes) < self._axes:
             raise InputError(f"{len(axes)} axes, the mapping needs {self._axes}")
@@ -75,7 +77,7 @@ def _pressed(buttons: Sequence[int], number: int) -> bool:
 
 
 def _terms(path: str, text: str) -> Terms:
-    """The signed axes and buttons of a direction."""
+    """Parse the signed axes and buttons of a direction."""
     terms: Terms = []
     at = 0
     while at < len(text):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keys of a terminal as deflections: a terminal tells presses and repeats, but no releases."""
+"""Keys of a terminal as deflections; a terminal reports presses and repeats, but no releases."""
 
 import numpy as np
 
@@ -12,19 +12,19 @@ DIRECTIONS = {
 }  # fmt: skip
 FASTER, SLOWER, STOP, QUIT = "+", "-", " ", "q"
 HELP = (
-    "w s: x    a d: y    r f: z    u o, i k, j l: turn about x, y, z\n"
+    "w s: x    a d: y    r f: z    u o, i k, j l: rotate about x, y, z\n"
     "+ -: faster, slower    space: stop    q: quit"
 )
 
 
 class KeyState:
-    """Which directions are held: each for a while after its key was last heard.
+    """Directions held by keys, each for a while after its last key press.
 
     Args:
         settings: The block `keyboard`.
 
     Attributes:
-        speed: Share of the full speed that a key stands for.
+        speed: Deflection that a pressed key stands for, as a share of full deflection.
     """
 
     def __init__(self, settings: KeyboardSettings) -> None:
@@ -33,7 +33,7 @@ class KeyState:
         self.speed = 0.5
 
     def press(self, key: str, now: float) -> None:
-        """A key was heard at a time [s]; any that means nothing lets go of all."""
+        """Handle a key press at a time [s]; an unknown key releases all directions."""
         if key in DIRECTIONS:
             direction, sign = DIRECTIONS[key]
             self._keys[direction] = sign, now
@@ -44,9 +44,9 @@ class KeyState:
             self._keys.clear()
 
     def stick(self, now: float) -> Array:
-        """Deflections along x, y, z and about them at a time [s], shape (6,)."""
+        """Return the deflections along and about x, y, z at a time [s], shape (6,)."""
         stick = np.zeros(6)
-        for direction, (sign, heard) in self._keys.items():
-            if now - heard <= self._settings.key_hold:
+        for direction, (sign, pressed) in self._keys.items():
+            if now - pressed <= self._settings.key_hold:
                 stick[direction] = sign * self.speed
         return stick

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motions that a hand intends, as pure functions of time with exact derivatives."""
+"""Intended motions of a hand, as pure functions of time with exact derivatives."""
 
 from collections.abc import Callable
 
@@ -12,25 +12,28 @@ from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.reference import Reference
 
 Trajectory = Callable[[float], Reference]
-"""Time [s] to the intended position, velocity and acceleration in subtask coordinates."""
+"""Function from time [s] to intended position, velocity and acceleration of a subtask."""
 
 TREMOR_FREQUENCIES = np.array([70.0**0.5, 4.0 * 5.0**0.5, 6.0 * 3.0**0.5, 8.0 * 2.0**0.5])
-"""Hz; in the band of physiological tremor, 8 to 12 Hz, with irrational ratios: never periodic."""
+"""Frequencies in the band of physiological tremor, 8 to 12 Hz [Hz].
+
+Their ratios are irrational, so that their sum is not periodic.
+"""
 
 
 def still(position: ArrayLike, layout: Layout | None = None) -> Trajectory:
-    """Rests at a value of shape (size,) [m; quaternions]."""
+    """Build a rest at a value of shape (size,) [m; quaternions]."""
     reference = Reference.at_rest(position, layout)
     return lambda t: reference
 
 
 def swing(amplitude: ArrayLike, frequency: float, offset: ArrayLike) -> Trajectory:
-    """Swings as offset + amplitude sin(frequency t), the operator of the paper's Section V.
+    """Build the oscillation offset + amplitude sin(frequency t), the paper's Section V operator.
 
     Args:
         amplitude: Amplitude of each coordinate [m], shape (dim,).
         frequency: Angular frequency [rad/s].
-        offset: Value around which it swings [m], shape (dim,).
+        offset: Mean value [m], shape (dim,).
     """
     size = np.array(amplitude, dtype=np.float64)
     middle = np.array(offset, dtype=np.float64)
@@ -45,16 +48,16 @@ def swing(amplitude: ArrayLike, frequency: float, offset: ArrayLike) -> Trajecto
 
 
 def circle(centre: ArrayLike, radius: float, frequency: float, ramp: float) -> Trajectory:
-    """Runs round a circle in the plane of the first two coordinates, from rest at t = 0.
+    """Build a circle in the plane of the first two coordinates, from rest at t = 0.
 
-    It starts at centre + (radius, 0); the angular rate grows to `frequency` along the
+    The motion starts at centre + (radius, 0). The angular rate rises to `frequency` along the
     minimum-jerk step.
 
     Args:
         centre: Centre [m], shape (dim,), dim >= 2.
         radius: Radius [m].
         frequency: Angular frequency after the start [rad/s]; negative is clockwise.
-        ramp: Time in which the angular rate grows [s]; 0 starts at full rate.
+        ramp: Rise time of the angular rate [s]; 0 starts at full rate.
     """
     middle = np.array(centre, dtype=np.float64)
 
@@ -69,12 +72,12 @@ def circle(centre: ArrayLike, radius: float, frequency: float, ramp: float) -> T
 
 
 def rocking(rotation: ArrayLike, frequency: float, ramp: float) -> Trajectory:
-    """Rotation vectors that swing with the sine of a circle's angle, from rest at t = 0.
+    """Build rotation vectors in phase with the sine of a circle's angle, from rest at t = 0.
 
     Args:
         rotation: Amplitude of the rotation vectors [rad], shape (dim,).
         frequency: Angular frequency after the start [rad/s].
-        ramp: Time in which the angular rate grows [s]; 0 starts at full rate.
+        ramp: Rise time of the angular rate [s]; 0 starts at full rate.
     """
     size = np.array(rotation, dtype=np.float64)
 
@@ -89,22 +92,22 @@ def rocking(rotation: ArrayLike, frequency: float, ramp: float) -> Trajectory:
 
 
 def _spin_up(t: float, ramp: float) -> tuple[float, float, float]:
-    """Angle, rate and its derivative for a final rate of 1."""
+    """Return angle, rate and its derivative for a final rate of 1."""
     if t < 0.0:
         return 0.0, 0.0, 0.0
     if t >= ramp:
         return t - 0.5 * ramp, 1.0, 0.0
     u = t / ramp
     rate, growth, _ = blend(u)
-    angle = ramp * u**4 * (2.5 + u * (u - 3.0))  # the integral of `rate`
+    angle = ramp * u**4 * (2.5 + u * (u - 3.0))  # The integral of `rate`.
     return angle, rate, growth / ramp
 
 
 def waypoints(times: ArrayLike, points: ArrayLike, layout: Layout | None = None) -> Trajectory:
-    """Moves from point to point with minimum jerk, at rest in each; C2 for all times.
+    """Build minimum-jerk moves from point to point, at rest in each; C2 for all times.
 
     Args:
-        times: When each point is reached [s], shape (n,), n >= 2, increasing.
+        times: Time of arrival at each point [s], shape (n,), n >= 2, increasing.
         points: The points [m; quaternions], shape (n, size).
         layout: Layout of a point; plain numbers, if None.
     """
@@ -112,14 +115,14 @@ def waypoints(times: ArrayLike, points: ArrayLike, layout: Layout | None = None)
     return RestToRest(instants[:-1], np.diff(instants), points, layout)
 
 
-def turning(
-    place: Trajectory, turn: Trajectory, orientations: ArrayLike, layout: Layout
+def with_rotation(
+    translation: Trajectory, rotation: Trajectory, orientations: ArrayLike, layout: Layout
 ) -> Trajectory:
-    """Moves along one motion and turns by another.
+    """Combine a translational and a rotational motion.
 
     Args:
-        place: Trajectory of the plain numbers.
-        turn: Trajectory of the rotation vectors that lead away from the orientations [rad].
+        translation: Trajectory of the plain numbers.
+        rotation: Trajectory of the rotation vectors away from the orientations [rad].
         orientations: Quaternion of each rotation, one after the other.
         layout: Layout of the result.
     """
@@ -128,7 +131,7 @@ def turning(
     base = Reference.at_rest(middle, layout)
 
     def motion(t: float) -> Reference:
-        p, r = place(t), turn(t)
+        p, r = translation(t), rotation(t)
         gap = Reference(
             layout.stack_components(p.position, r.position),
             layout.stack_components(p.velocity, r.velocity),
@@ -140,12 +143,12 @@ def turning(
 
 
 def delayed(motion: Trajectory, start: float) -> Trajectory:
-    """The motion with its own time counted from `start` [s]."""
+    """Delay a motion: count its time from `start` [s]."""
     return lambda t: motion(t - start)
 
 
 def with_tremor(motion: Trajectory, amplitude: ArrayLike, seed: int, layout: Layout) -> Trajectory:
-    """Adds physiological tremor: sinusoids between 8 and 12 Hz with random phases.
+    """Add physiological tremor: sinusoids between 8 and 12 Hz with random phases.
 
     Args:
         motion: The steady motion.

@@ -17,18 +17,18 @@ from noninteract_ros.subtasks.reference import Reference
 
 
 def read_recording(path: str | Path, size: int) -> tuple[Array, Array]:
-    """Reads a recorded motion.
+    """Read a recorded motion.
 
     Args:
         path: CSV file with a header: `t` [s], then one column per number of a value [m], as in
             `t, x, y` or `t, x, y, z, qx, qy, qz, qw`.
-        size: How many numbers a value has.
+        size: Count of numbers in a value.
 
     Returns:
         Times, shape (n,), increasing, and values, shape (n, size), n >= 2.
 
     Raises:
-        InputError: The file cannot be read; the text names the line and what is wrong with it.
+        InputError: The file is not a valid recording; the text names the line and the error.
     """
     try:
         with open(path, encoding="utf-8-sig", newline="") as stream:
@@ -77,12 +77,12 @@ def _is_number(text: str) -> bool:
 
 
 def replay(times: Array, values: Array, layout: Layout | None = None) -> Trajectory:
-    """Replays a recording along its cubic spline, with the first sample at t = 0.
+    """Build a replay of a recording along its cubic spline, with the first sample at t = 0.
 
-    The motion passes through every sample and is C2 between the first and the last. The spline's
-    ends are free (not-a-knot): a recording that was cut in mid-motion is not braked to rest, which
-    would ask for an acceleration that the hand never had. Rotations follow scipy's spline on
-    SO(3), C2 too, whose ends do not accelerate. Outside, it rests at the end samples.
+    The motion passes through every sample and is C2 between the first and the last. Outside, it
+    rests at the end samples. The spline's ends are free (not-a-knot): braking a recording that was
+    cut in mid-motion would need an acceleration that the hand never had. Rotations follow scipy's
+    spline on SO(3), also C2, with zero angular acceleration at its ends.
 
     Args:
         times: Increasing times [s], shape (n,), n >= 2.
@@ -92,7 +92,7 @@ def replay(times: Array, values: Array, layout: Layout | None = None) -> Traject
     layout = layout or Layout.scalars(values.shape[1])
     since = times - times[0]
     plain = CubicSpline(since, values[:, layout.values])
-    turns = [
+    rotations = [
         RotationSpline(since, Rotation.from_quat(values[:, part])) for part in layout.quaternions
     ]
 
@@ -103,10 +103,14 @@ def replay(times: Array, values: Array, layout: Layout | None = None) -> Traject
         x[layout.values], v[layout.rates], a[layout.rates] = (
             plain(t, order) for order in range(3)
         )
-        for turn, part, angular in zip(turns, layout.quaternions, layout.angular, strict=True):
-            rotation = turn(t)
+        for spline, part, angular in zip(
+            rotations, layout.quaternions, layout.angular, strict=True
+        ):
+            rotation = spline(t)
             x[part] = rotation.as_quat()
-            v[angular], a[angular] = rotation.apply([turn(t, 1), turn(t, 2)])  # from body axes
+            v[angular], a[angular] = rotation.apply(
+                [spline(t, 1), spline(t, 2)]
+            )  # From body axes.
         return Reference(x, v, a)
 
     return motion

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An operator's device that is connected to the team by a link, both ways.
+"""Bilateral link between an operator's device and the team.
 
-One tick: the feedback is sent off, what has arrived at the device acts on the hand, the motion
-that results is sent off, what has arrived at the team's end becomes the reference.
+One tick: send the feedback, apply the feedback that has arrived at the device to the hand, send
+the resulting motion, turn the motion that has arrived at the team's end into the reference.
 """
 
 import math
@@ -22,7 +22,7 @@ from noninteract_ros.sources.link.wave_variables import WaveDevice, WaveTeam
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.reference import Reference
 
-LONGEST_GAP = 0.1  # [s] after a longer one without samples the link is taken up again
+LONGEST_GAP = 0.1  # Time without samples [s] after which the connection is re-established.
 
 ENDS: dict[str, tuple[type[ObservedDevice], type[ObservedTeam]]] = {
     "none": (ObservedDevice, ObservedTeam),
@@ -32,17 +32,17 @@ ENDS: dict[str, tuple[type[ObservedDevice], type[ObservedTeam]]] = {
 
 
 class LinkAccount(NamedTuple):
-    """The energy account of a link since the run began.
+    """Energy account of a link since the start of the run.
 
     Attributes:
-        operator_in: Energy that the hand has put in [J].
-        operator_out: Energy that the hand has got out [J].
-        team_in: Energy that the team's impedance has got [J].
-        team_out: Energy that it has given back [J].
-        device_budget: What the device may still give to the hand [J].
-        team_budget: What may still be given to the team's impedance [J].
-        surprise: How far motions that the device's end did not expect can have overdrawn it [J].
-        lost: Packets that never arrive, both ways.
+        operator_in: Energy absorbed from the hand [J].
+        operator_out: Energy delivered to the hand [J].
+        team_in: Energy delivered to the team's impedance [J].
+        team_out: Energy absorbed from the team's impedance [J].
+        device_budget: Energy that may still be delivered to the hand [J].
+        team_budget: Energy that may still be delivered to the team's impedance [J].
+        surprise: Bound of the overdraft at the device's end by mispredicted displacements [J].
+        lost: Count of lost packets, both directions.
     """
 
     operator_in: float
@@ -56,22 +56,22 @@ class LinkAccount(NamedTuple):
 
     @property
     def operator_net(self) -> float:
-        """Energy put in by the hand less what it got out [J]: at least -(reserve + surprise)."""
+        """Net energy absorbed from the hand [J]; at least -(reserve + surprise)."""
         return self.operator_in - self.operator_out
 
 
 class BilateralLink:
-    """A device whose motion reaches the team, and the team's feedback the device, over a link.
+    """Link that carries the device's motion to the team and the team's feedback to the device.
 
     Args:
-        device: The device in the operator's hand.
-        haptic: Its settings; the hand has a mass.
-        settings: The link.
+        device: Device in the operator's hand.
+        haptic: Settings of the device; the hand has a mass.
+        settings: Settings of the link.
         layout: Layout of the commanded subtask's values.
         path: Dotted key of the link's block, for error messages.
 
     Raises:
-        ScenarioError: The hand is rigid, so that it can feel nothing.
+        ScenarioError: The hand has no mass, so that feedback cannot act on it.
     """
 
     def __init__(
@@ -99,59 +99,59 @@ class BilateralLink:
 
     @property
     def account(self) -> LinkAccount | None:
-        """The energies so far; None before the first sample."""
+        """Energies since the start of the run; None before the first sample."""
         if self._index is None:
             return None
         hand, team = self._device_end.port, self._team_end.port
         return LinkAccount(
-            hand.taken,
-            hand.given,
-            team.given,
-            team.taken,
-            self._device_end.budget.level,
-            self._team_end.budget.level,
-            self._device_end.surprise,
-            float(self._to_team.lost + self._to_device.lost),
+            operator_in=hand.absorbed,
+            operator_out=hand.delivered,
+            team_in=team.delivered,
+            team_out=team.absorbed,
+            device_budget=self._device_end.budget.level,
+            team_budget=self._team_end.budget.level,
+            surprise=self._device_end.surprise,
+            lost=float(self._to_team.lost + self._to_device.lost),
         )
 
     @property
     def device_motion(self) -> Reference:
-        """The device's motion at the last sample."""
+        """Motion of the device at the last sample."""
         return self._motion
 
     def sample(self, t: float, feedback: Array | None = None) -> Reference | None:
-        """The reference that the team's end makes for an update instant.
+        """Return the reference of the team's end for an update instant.
 
         Args:
-            t: Time [s], taken to the nearest update instant.
+            t: Time [s], rounded to the nearest update instant.
             feedback: Force that the team's impedance reflects [N; N m], shape (dim,).
 
         Returns:
-            The reference; None where the device does not speak.
+            The reference; None where the device has no sample.
 
         Raises:
-            InputError: The feedback has another shape or is not finite.
+            InputError: The feedback has the wrong shape or is not finite.
         """
         index = round(t * self._rate)
         force = self._settings.force_scale * self._device.checked(feedback)
         before = self._index
         if before is None or not 0 <= index - before <= LONGEST_GAP * self._rate:
-            return self._begin(index)
+            return self._connect(index)
         reference: Reference | None = self._reference
         for tick in range(before, index):
             reference = self._tick(tick, force)
         return reference
 
     def next_update(self, t: float) -> float:
-        """The first update instant later than `t` [s], spoken or not."""
+        """Return the first update instant after `t` [s], with or without a sample."""
         return self._device.next_update(t)
 
-    def silent_until(self, t: float) -> float:
-        """The first instant later than `t` [s] for which there is a sample; infinity if none."""
-        return self._device.silent_until(t)
+    def next_sample(self, t: float) -> float:
+        """Return the first instant after `t` with a sample [s]; infinity if there is none."""
+        return self._device.next_sample(t)
 
-    def _begin(self, index: int) -> Reference | None:
-        """Starts where the device is; after a break with the energy that was left."""
+    def _connect(self, index: int) -> Reference | None:
+        """Start at the device's motion; after an interruption, with the remaining energy."""
         motion = self._device.sample(index / self._rate)
         if motion is None:
             self._index = None
@@ -159,34 +159,34 @@ class BilateralLink:
         self._to_team.reset()
         self._to_device.reset()
         if index < self._latest:
-            self._new_ends(motion)
+            self._create_ends(motion)
         self._device_end.resume()
         self._team_end.resume(motion)
         self._index = self._latest = index
         self._motion = self._reference = motion
         return motion
 
-    def _new_ends(self, motion: Reference) -> None:
+    def _create_ends(self, motion: Reference) -> None:
         settings, period = self._settings, 1.0 / self._rate
-        limited = self._device.limited
+        saturate = self._device.saturate
         device, team = ENDS[settings.passivity]
-        self._device_end = device(settings, self._metric, period, limited)
+        self._device_end = device(settings, self._metric, period, saturate)
         self._team_end = team(settings, self._layout, self._metric, period, motion)
 
     def _tick(self, tick: int, feedback: Array) -> Reference | None:
         now, later = tick / self._rate, (tick + 1) / self._rate
         self._to_device.send(now, self._team_end.packet(feedback))
         for packet in self._to_device.receive(now):
-            self._device_end.hear(packet)
+            self._device_end.receive(packet)
         force = self._device_end.force(self._motion.velocity)
         motion = self._device.sample(later, force)
         if motion is None:
             self._index = None
             return None
-        way = self._layout.difference(motion.position, self._motion.position)
-        self._to_team.send(later, self._device_end.moved(force, way, motion))
+        displacement = self._layout.difference(motion.position, self._motion.position)
+        self._to_team.send(later, self._device_end.observe(force, displacement, motion))
         for packet in self._to_team.receive(later):
-            self._team_end.hear(packet)
+            self._team_end.receive(packet)
         self._index = self._latest = tick + 1
         self._motion = motion
         self._reference = self._team_end.advance(feedback)

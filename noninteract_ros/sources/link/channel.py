@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One direction of a connection: packets arrive late, out of order, or never."""
+"""One direction of a connection: packets are delayed, reordered or lost."""
 
 import heapq
 from typing import Generic, TypeVar
@@ -9,19 +9,19 @@ import numpy as np
 from noninteract_ros.sources.link.settings import LinkSettings
 
 Payload = TypeVar("Payload")
-TOLERANCE = 1e-9  # [s] by which an arrival may lie after the time that is asked for
+TOLERANCE = 1e-9  # Arrivals up to this much later than the requested time count as arrived [s].
 
 
 class Channel(Generic[Payload]):
-    """Carries packets; what happens to the n-th one depends on the seed and n alone.
+    """Packets under way; the delay and loss of the n-th one depend on the seed and n alone.
 
     Args:
-        settings: Delay, its spread, losses and whether packets overtake each other.
-        direction: Number that makes the two directions of a connection differ.
+        settings: Delay, its spread, losses, and whether packets may overtake each other.
+        direction: Number that distinguishes the two directions of a connection.
 
     Attributes:
-        sent: How many packets were sent.
-        lost: How many of them will never arrive.
+        sent: Count of packets sent.
+        lost: Count of packets that never arrive.
     """
 
     def __init__(self, settings: LinkSettings, direction: int) -> None:
@@ -29,18 +29,18 @@ class Channel(Generic[Payload]):
         self.reset()
 
     def reset(self) -> None:
-        """Starts anew, with the same fate for the n-th packet."""
+        """Discard all packets and restart the random sequence."""
         self._random = np.random.default_rng([self._settings.seed, self._direction])
         self._under_way: list[tuple[float, int, Payload]] = []
         self._last_arrival = -np.inf
         self.sent = self.lost = 0
 
     def send(self, now: float, payload: Payload) -> None:
-        """Sends a packet at a time [s]."""
+        """Send a packet at a time [s]."""
         settings = self._settings
-        spread, fate = self._random.uniform(-1.0, 1.0), self._random.random()
+        spread, uniform = self._random.uniform(-1.0, 1.0), self._random.random()
         self.sent += 1
-        if fate < settings.loss:
+        if uniform < settings.loss:
             self.lost += 1
             return
         arrival = now + settings.delay * (1.0 + settings.jitter * spread)
@@ -49,7 +49,7 @@ class Channel(Generic[Payload]):
         heapq.heappush(self._under_way, (arrival, self.sent, payload))
 
     def receive(self, now: float) -> list[Payload]:
-        """The packets that have arrived by a time [s] since the last call, in order of arrival."""
+        """Return the packets that have arrived by a time [s] since the last call, in order."""
         arrived = []
         while self._under_way and self._under_way[0][0] <= now + TOLERANCE:
             arrived.append(heapq.heappop(self._under_way)[2])

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The energy that one end of a connection may spend, and the packets that bring it.
+"""Energy budget of one end of a connection, and the packets that carry energy counts.
 
-Each end counts the energy that it has taken up in all, which never falls, and sends the count with
-every packet. The other end may spend by how much the greatest count that has arrived has grown: a
-lost packet makes energy come later, a late or repeated one brings none.
+Each end counts the energy that it has absorbed in total. The count never falls and is part of
+every packet. The other end may spend the growth of the largest count received. So a lost packet
+delays energy, and a late or repeated one adds none.
 """
 
 from typing import NamedTuple
@@ -12,13 +12,13 @@ from noninteract_ros.arrays import Array
 
 
 class Packet(NamedTuple):
-    """What one end tells the other.
+    """Packet from one end to the other.
 
     Attributes:
-        number: Number of the packet, growing.
-        signals: What it has measured: position and velocity, or a force.
-        energy: Energy that it has taken up for the other end in all [J].
-        level: Energy that it may still spend itself [J].
+        number: Sequence number, increasing.
+        signals: Signals of the sender: position and velocity, or a force.
+        energy: Total energy that the sender has absorbed for the other end [J].
+        level: Energy that the sender may still spend [J].
     """
 
     number: int
@@ -28,42 +28,42 @@ class Packet(NamedTuple):
 
 
 class Budget:
-    """What an end may spend: what the other end has announced, less what was spent.
+    """Energy that an end may spend: the energy reported by the other end, less the energy spent.
 
     Args:
-        reserve: Level at the start [J].
-        capacity: Highest level; what comes beyond it is forgone [J].
+        reserve: Initial level [J].
+        capacity: Highest level; energy above it is discarded [J].
 
     Attributes:
-        level: What may be spent now [J]; below zero it is overdrawn.
+        level: Energy that may be spent now [J]; negative where overdrawn.
     """
 
     def __init__(self, reserve: float, capacity: float) -> None:
         self._capacity = max(reserve, capacity)
         self.level = reserve
-        self._announced = 0.0
+        self._reported = 0.0
 
-    def announce(self, energy: float) -> None:
-        """Takes note of a count of the other end [J]."""
-        if energy > self._announced:
-            self.level = min(self.level + energy - self._announced, self._capacity)
-            self._announced = energy
+    def receive(self, energy: float) -> None:
+        """Update with a received energy count of the other end [J]."""
+        if energy > self._reported:
+            self.level = min(self.level + energy - self._reported, self._capacity)
+            self._reported = energy
 
-    def keep(self, energy: float, level: float) -> float:
-        """Saves energy [J] until the level is as high as `level`; returns what is left of it."""
+    def save(self, energy: float, level: float) -> float:
+        """Save energy [J] until the level reaches `level`; return the remainder [J]."""
         saved = min(energy, max(level - self.level, 0.0))
         self.level += saved
         return energy - saved
 
 
-class Newest:
-    """Tells packets that are newer than all before them from those that were overtaken."""
+class PacketOrder:
+    """Filter that rejects packets overtaken by newer ones."""
 
     def __init__(self) -> None:
         self._number = -1
 
-    def is_newer(self, packet: Packet) -> bool:
-        """Whether a packet is the newest so far; it then counts as arrived."""
+    def accept(self, packet: Packet) -> bool:
+        """Return True, and store the number, if a packet is newer than all before it."""
         if packet.number <= self._number:
             return False
         self._number = packet.number

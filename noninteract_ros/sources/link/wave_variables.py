@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ends of a connection that exchange wave variables instead of force and velocity.
 
-With an impedance B, diagonal, a force F and a velocity v are the waves
+With a diagonal impedance B, the waves of a force F and a velocity v are
 
     u = (B v + F) / sqrt(2 B),  w = (B v - F) / sqrt(2 B),  F' v = (u' u - w' w) / 2,
 
-so that delaying u on its way there and w on its way back stores energy and makes none. A delay
-that varies and packets that are lost or held break that. Hence both ends still observe what passes
-their ports and give away no more than was announced (`time_domain_passivity.py`): the waves say
-what is wanted, the account what may be.
+so a constant delay of u and w stores energy and generates none. A varying delay and lost or held
+packets may generate some. Hence both ends still observe their ports and deliver no more than the
+other end has reported (`time_domain_passivity.py`): the waves determine the wanted force or
+velocity, the energy account limits it.
 """
 
 from functools import cached_property
@@ -20,11 +20,11 @@ from noninteract_ros.sources.link.settings import LinkSettings
 from noninteract_ros.sources.link.time_domain_passivity import ObservedDevice, ObservedTeam
 from noninteract_ros.subtasks.reference import Reference
 
-CATCH_UP = 2.0  # [1/s] at which a distance between the ends goes, which waves alone would keep
+CATCH_UP = 2.0  # Decay rate of a position difference, which waves alone would keep [1/s].
 
 
 class _Waves:
-    """Impedance B of a connection, as its settings have it, and the root of 2 B, shape (p,)."""
+    """Impedance B of a connection and the root of 2 B, shape (p,) each."""
 
     _settings: LinkSettings
     _metric: Array
@@ -39,33 +39,33 @@ class _Waves:
 
 
 class WaveDevice(_Waves, ObservedDevice):
-    """The device's end: takes w, answers a velocity with f = sqrt(2 B) w - B v, tells u."""
+    """Device's end: receives w, applies f = sqrt(2 B) w - B v, sends u."""
 
     def _wanted(self, velocity: Array) -> Array:
-        return self._root * self._heard - self._impedance * velocity
+        return self._root * self._received - self._impedance * velocity
 
-    def _told(self, force: Array, way: Array, motion: Reference) -> Array:
-        """The wave of the force that acted and of the mean velocity of the tick."""
-        return (self._impedance * (way / self._period) - force) / self._root
+    def _signal(self, force: Array, displacement: Array, motion: Reference) -> Array:
+        """Return the wave of the applied force and the mean velocity of the tick."""
+        return (self._impedance * (displacement / self._period) - force) / self._root
 
 
 class WaveTeam(_Waves, ObservedTeam):
-    """The team's end: takes u, answers a force with v = (sqrt(2 B) u - F) / B, tells w.
+    """Team's end: receives u, moves with v = (sqrt(2 B) u - F) / B, sends w.
 
-    The answer is smoothed with the link's bandwidth, since the force follows it at once through
-    the damping. A position that was sent along is caught up with.
+    The velocity is smoothed with the link's bandwidth, since the force follows it at once through
+    the damping. Differences from the received position decay.
     """
 
     def resume(self, start: Reference) -> None:
-        """Starts from where the device is now, without a wave under way."""
-        self._now, self._heard = start, (start.position, np.zeros_like(start.velocity))
+        """Start at the device's present motion, without a wave."""
+        self._now, self._received = start, (start.position, np.zeros_like(start.velocity))
 
     def _wanted(self, feedback: Array) -> Array:
-        position, wave = self._heard
-        away = self._layout.difference(position, self._now.position)
-        goal = (self._root * wave + feedback) / self._impedance + CATCH_UP * away
+        position, wave = self._received
+        error = self._layout.difference(position, self._now.position)
+        goal = (self._root * wave + feedback) / self._impedance + CATCH_UP * error
         share = self._period * self._settings.bandwidth
         return self._now.velocity + share * (goal - self._now.velocity)
 
-    def _told(self, feedback: Array) -> Array:
+    def _signal(self, feedback: Array) -> Array:
         return (self._impedance * self._now.velocity + feedback) / self._root

@@ -110,5 +110,5 @@ def test_what_concerns_translations_is_refused_where_there_are_none() -> None:
     """A mass of the device says nothing about turning; its key is named."""
     turn = Layout((0,), (True,))
     values = {**GRIP, "motion": "still", "centre": [], "device_mass": 0.2}
-    with pytest.raises(ScenarioError, match=r"haptic\.device_mass: found 0\.2.* only turns"):
+    with pytest.raises(ScenarioError, match=r"haptic\.device_mass: found 0\.2.* only rotates"):
         HapticDevice(load(HapticSettings, values, "haptic"), turn)
