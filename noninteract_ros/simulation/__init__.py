@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A simulated team with its surroundings."""
+"""Simulated team with its environment: objects, doors, walls and pushes."""

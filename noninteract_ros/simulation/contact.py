@@ -12,7 +12,7 @@ from noninteract_ros.arrays import Array
 
 @dataclass(frozen=True, slots=True)
 class FrameMotion:
-    """Where a frame is and how it moves, in world axes.
+    """Pose and velocity of a frame, in world axes.
 
     Attributes:
         position: Origin, shape (3,) [m].
@@ -29,13 +29,13 @@ class FrameMotion:
 
 @dataclass(frozen=True, slots=True)
 class Effect:
-    """What a coupling does at one instant.
+    """Wrenches, stored energy and dissipation of a coupling at one instant.
 
     Attributes:
         wrenches: Wrench on each of the coupling's frames, at its origin, world axes, shape (6,)
             each [N, N m].
-        potential: Energy that it stores [J].
-        dissipated: Power that it turns to heat, never negative [W].
+        potential: Stored energy [J].
+        dissipated: Dissipated power, never negative [W].
     """
 
     wrenches: tuple[Array, ...]
@@ -44,19 +44,19 @@ class Effect:
 
 
 class Coupling(Protocol):
-    """A passive thing between frames of a plant."""
+    """A passive element between frames of a plant."""
 
     @property
     def frames(self) -> tuple[str, ...]:
-        """Names of its frames."""
+        """Names of the frames."""
 
     def effect(self, motions: tuple[FrameMotion, ...]) -> Effect:
-        """Wrenches, energy and loss for the motion of its frames, in their order."""
+        """Compute wrenches, energy and dissipation from the motions of the frames."""
 
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """Springs and dampers that hold two frames together, in translation and rotation.
+    """Compliant grip: springs and dampers between two frames, in translation and rotation.
 
     The translational force acts on both origins in opposite directions; the rotational torque is
     the gradient of c |log(R_2 R_1')|^2 / 2.
@@ -76,33 +76,33 @@ class Grip:
     rotational_damping: float = 0.0
 
     def effect(self, motions: tuple[FrameMotion, ...]) -> Effect:
-        """Wrench on the first frame, its opposite on the second."""
+        """Compute the wrench on the first frame and its opposite on the second."""
         first, second = motions
-        stretch = second.position - first.position
-        stretching = second.velocity - first.velocity
-        force = self.stiffness * stretch + self.damping * stretching
+        extension = second.position - first.position
+        extension_rate = second.velocity - first.velocity
+        force = self.stiffness * extension + self.damping * extension_rate
         torque = np.zeros(3)
-        potential = 0.5 * self.stiffness * float(stretch @ stretch)
-        dissipated = self.damping * float(stretching @ stretching)
+        potential = 0.5 * self.stiffness * float(extension @ extension)
+        dissipated = self.damping * float(extension_rate @ extension_rate)
         if self.rotational_stiffness or self.rotational_damping:
-            twist = pin.log3(second.rotation @ first.rotation.T)
-            twisting = second.angular_velocity - first.angular_velocity
-            torque = self.rotational_stiffness * twist + self.rotational_damping * twisting
-            potential += 0.5 * self.rotational_stiffness * float(twist @ twist)
-            dissipated += self.rotational_damping * float(twisting @ twisting)
+            rotation = pin.log3(second.rotation @ first.rotation.T)
+            rotation_rate = second.angular_velocity - first.angular_velocity
+            torque = self.rotational_stiffness * rotation + self.rotational_damping * rotation_rate
+            potential += 0.5 * self.rotational_stiffness * float(rotation @ rotation)
+            dissipated += self.rotational_damping * float(rotation_rate @ rotation_rate)
         wrench = np.concatenate([force, torque])
         return Effect((wrench, -wrench), potential, dissipated)
 
 
 @dataclass(frozen=True, slots=True)
 class WallContact:
-    """A flat wall that pushes a point back and never pulls (Hunt and Crossley's force law).
+    """Unilateral contact of a point with a flat wall (Hunt and Crossley's force law).
 
-    Force along the normal: max(0, k d (1 + c d_rate)) with the depth d; it is continuous when
-    contact begins and ends.
+    The force along the normal is max(0, k d (1 + c d_rate)) with the penetration depth d. It is
+    continuous at the start and end of contact.
 
     Attributes:
-        frames: Name of the frame whose origin touches.
+        frames: Name of the frame whose origin is in contact.
         point: A point of the wall, shape (3,) [m].
         normal: Unit normal, away from the wall, shape (3,).
         stiffness: k [N/m].
@@ -116,13 +116,13 @@ class WallContact:
     damping: float
 
     def effect(self, motions: tuple[FrameMotion, ...]) -> Effect:
-        """Push on the point, where it is in the wall."""
+        """Compute the contact force; zero where the point is outside the wall."""
         (motion,) = motions
         depth = -float(self.normal @ (motion.position - self.point))
         if depth <= 0.0:
             return Effect((np.zeros(6),), 0.0, 0.0)
-        sinking = -float(self.normal @ motion.velocity)
+        depth_rate = -float(self.normal @ motion.velocity)
         elastic = self.stiffness * depth
-        force = max(0.0, elastic * (1.0 + self.damping * sinking))
+        force = max(0.0, elastic * (1.0 + self.damping * depth_rate))
         wrench = np.concatenate([force * self.normal, np.zeros(3)])
-        return Effect((wrench,), 0.5 * elastic * depth, (force - elastic) * sinking)
+        return Effect((wrench,), 0.5 * elastic * depth, (force - elastic) * depth_rate)

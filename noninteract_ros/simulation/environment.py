@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a scenario puts around its team: a rigid object, walls, doors."""
+"""Environment of a team in a scenario: rigid objects, walls, doors."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -16,15 +16,15 @@ from noninteract_ros.team.team import Team
 
 @dataclass(frozen=True)
 class RigidObject:
-    """Configuration block of a body that robots hold through compliant grips.
+    """Configuration block of a rigid body held by robots through compliant grips.
 
-    It starts at the mean of the tool points of the robots that hold it; the grips start without
-    strain.
+    The body starts at the mean of the tool points of the robots that hold it. The grips start
+    without strain.
     """
 
-    kind: str = key("Kind of surrounding", choices=("rigid_object",))
+    kind: str = key("Kind of the environment element", choices=("rigid_object",))
     mass: float = key("Mass [kg]", positive=True)
-    size: tuple[float, ...] = key("Edges of a box of uniform density [m]", (0.4, 0.1, 0.1))
+    size: tuple[float, ...] = key("Edge lengths of a box of uniform density [m]", (0.4, 0.1, 0.1))
     held_by: tuple[str, ...] = key("Robots that hold it; by default all", ())
     stiffness: float = key("Translational stiffness of a grip [N/m]", 2000.0, minimum=0.0)
     damping: float = key("Translational damping of a grip [N s/m]", 40.0, minimum=0.0)
@@ -32,15 +32,14 @@ class RigidObject:
     rotational_damping: float = key("Rotational damping [N m s/rad]", 0.0, minimum=0.0)
 
     def build(self, name: str, team: Team) -> tuple[list[pin.Model], list[Coupling]]:
-        """The body as a model, and its grips.
+        """Build the model of the body and its grips.
 
         Raises:
-            ScenarioError: An unknown robot, or a size that is none.
+            ScenarioError: A robot is unknown, or the size is not 3 positive numbers.
         """
         if len(self.size) != 3 or min(self.size) <= 0.0:
             raise ScenarioError(join(name, "size"), list(self.size), "3 numbers > 0")
-        holders = self.held_by or team.names
-        tools = _tool_placements(name, "held_by", holders, team)
+        tools = _tool_placements(name, "held_by", self.held_by or team.names, team)
         centre = np.mean([tool.translation for tool in tools.values()], axis=0)
         model = pin.Model()
         joint = model.addJoint(
@@ -55,11 +54,11 @@ class RigidObject:
             model.addFrame(pin.Frame(frame, joint, start.actInv(tool), pin.FrameType.OP_FRAME))
             grips.append(
                 Grip(
-                    (_tool_name(team, robot), frame),
-                    self.stiffness,
-                    self.damping,
-                    self.rotational_stiffness,
-                    self.rotational_damping,
+                    frames=(_tool_name(team, robot), frame),
+                    stiffness=self.stiffness,
+                    damping=self.damping,
+                    rotational_stiffness=self.rotational_stiffness,
+                    rotational_damping=self.rotational_damping,
                 )
             )
         return [model], grips
@@ -67,9 +66,9 @@ class RigidObject:
 
 @dataclass(frozen=True)
 class Door:
-    """Configuration block of a hinged body; robots hold it where their tools start."""
+    """Configuration block of a hinged body, held by robots at their initial tool points."""
 
-    kind: str = key("Kind of surrounding", choices=("door",))
+    kind: str = key("Kind of the environment element", choices=("door",))
     hinge: tuple[float, ...] = key("A point of the hinge [m]")
     inertia: float = key("Moment of inertia about the hinge [kg m^2]", positive=True)
     axis: tuple[float, ...] = key("Direction of the hinge", (0.0, 0.0, 1.0))
@@ -79,10 +78,10 @@ class Door:
     damping: float = key("Damping of a grip [N s/m]", 50.0, minimum=0.0)
 
     def build(self, name: str, team: Team) -> tuple[list[pin.Model], list[Coupling]]:
-        """The door as a model, and its grips.
+        """Build the model of the door and its grips.
 
         Raises:
-            ScenarioError: An unknown robot, or a hinge or an axis that is none.
+            ScenarioError: A robot is unknown, or the hinge or the axis is not a valid vector.
         """
         hinge = _vector(join(name, "hinge"), self.hinge)
         axis = _unit(join(name, "axis"), self.axis)
@@ -91,7 +90,7 @@ class Door:
         joint = model.addJoint(
             0, pin.JointModelRevoluteUnaligned(axis), pin.SE3(np.eye(3), hinge), f"{name}/hinge"
         )
-        # All of the inertia about the axis; the other moments do not matter for a hinge.
+        # Only the moment about the axis matters for a hinge.
         body = pin.Inertia(1e-6, np.zeros(3), self.inertia * np.eye(3))
         model.appendBodyToJoint(joint, body, pin.SE3.Identity())
         model.damping[:] = self.hinge_damping
@@ -105,9 +104,9 @@ class Door:
 
 @dataclass(frozen=True)
 class Wall:
-    """Configuration block of a flat wall that tools can touch."""
+    """Configuration block of a flat wall in contact with tools."""
 
-    kind: str = key("Kind of surrounding", choices=("wall",))
+    kind: str = key("Kind of the environment element", choices=("wall",))
     point: tuple[float, ...] = key("A point of the wall [m]")
     normal: tuple[float, ...] = key("Normal, away from the wall")
     stiffness: float = key("Stiffness [N/m]", 10000.0, positive=True)
@@ -115,10 +114,10 @@ class Wall:
     touched_by: tuple[str, ...] = key("Robots whose tools can touch it; by default all", ())
 
     def build(self, name: str, team: Team) -> tuple[list[pin.Model], list[Coupling]]:
-        """No body, and a contact for each tool.
+        """Build a contact for each tool; a wall has no body.
 
         Raises:
-            ScenarioError: An unknown robot, or a point or a normal that is none.
+            ScenarioError: A robot is unknown, or the point or the normal is not a valid vector.
         """
         point = _vector(join(name, "point"), self.point)
         normal = _unit(join(name, "normal"), self.normal)
@@ -131,10 +130,10 @@ class Wall:
 
 
 class SurroundingBlock(Protocol):
-    """Configuration of something around the team."""
+    """Configuration block of an element of the environment."""
 
     def build(self, name: str, team: Team) -> tuple[list[pin.Model], list[Coupling]]:
-        """Bodies of its own, and its couplings with the team."""
+        """Build the models of its bodies and its couplings with the team."""
 
 
 SURROUNDINGS: dict[str, type[SurroundingBlock]] = {
@@ -151,7 +150,7 @@ def _tool_name(team: Team, robot: str) -> str:
 def _tool_placements(
     name: str, item: str, robots: tuple[str, ...], team: Team
 ) -> dict[str, pin.SE3]:
-    """Initial tool placements of robots, by name."""
+    """Return the initial tool placements of robots, by name."""
     state = team.state(team.q0, np.zeros(team.n))
     rotations = team.tool_rotations(team.q0)
     placements = {}

@@ -8,13 +8,13 @@ from noninteract_ros.arrays import Array
 
 
 class ConfigurationSpace(Protocol):
-    """Configurations that tangent vectors lead from one to the other."""
+    """Configuration manifold with tangent vectors."""
 
     def integrate(self, q: Array, step: Array) -> Array:
-        """Configuration reached from q along a tangent vector."""
+        """Return the configuration reached from q along a tangent vector."""
 
     def chart_velocity(self, q_0: Array, q: Array, v: Array) -> Array:
-        """Rate of the tangent vector that leads from q_0 to q, where q moves with velocity v."""
+        """Return the rate of the tangent vector from q_0 to q, for the velocity v at q."""
 
 
 def runge_kutta_step(
@@ -24,20 +24,21 @@ def runge_kutta_step(
     v: Array,
     step: float,
 ) -> tuple[Array, Array, Array]:
-    """One step of the classical Runge-Kutta method, global error O(step^4).
+    """Take one step of the classical Runge-Kutta method, global error O(step^4).
 
-    On curved spaces it works in the chart of tangent vectors at the start of the step
+    On curved spaces the method works in the chart of tangent vectors at the start of the step
     (Runge-Kutta-Munthe-Kaas), which keeps the order.
 
     Args:
-        space: Where q lives.
-        derivative: Acceleration, and rates of quantities to add up, at a state.
+        space: Configuration space of q.
+        derivative: Function of a state that returns the acceleration, and the rates of quantities
+            to integrate.
         q: Configuration, shape (nq,).
         v: Velocity, shape (nv,).
         step: Step [s].
 
     Returns:
-        Configuration and velocity after the step, and what the quantities grew by.
+        Configuration and velocity after the step, and the increments of the quantities.
     """
     half = 0.5 * step
     a_1, w_1 = derivative(q, v)

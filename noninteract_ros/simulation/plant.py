@@ -18,12 +18,12 @@ AXES = pin.LOCAL_WORLD_ALIGNED
 
 @dataclass(frozen=True, slots=True)
 class ExternalLoads:
-    """What acts on a plant besides controls, gravity and friction.
+    """External loads on a plant: couplings and pushes, without controls, gravity and friction.
 
     Attributes:
         coupling_torque: Generalised force of all couplings, shape (nv,) [N or N m].
         push_torque: Generalised force of all pushes, shape (nv,) [N or N m].
-        effects: What each coupling does.
+        effects: Effect of each coupling.
     """
 
     coupling_torque: Array
@@ -32,17 +32,17 @@ class ExternalLoads:
 
 
 class Plant:
-    """Everything that moves; the team's coordinates come first.
+    """Joint model of the team and all passive bodies; the team's coordinates come first.
 
     Args:
         team: The robots.
-        bodies: Models of passive bodies, each a tree of its own; joints and frames have names
-            that nothing else has.
+        bodies: Models of passive bodies, each a tree of its own; names of joints and frames are
+            unique.
         couplings: Passive couplings between frames of the team and of the bodies.
 
     Attributes:
         model: The joint model.
-        q0: Initial configuration: the team's own, the bodies' neutral one.
+        q0: Initial configuration: that of the team, and the neutral one of the bodies.
         friction: Viscous friction of all joints, shape (nv,) [N s/m or N m s/rad].
     """
 
@@ -73,7 +73,7 @@ class Plant:
         return self._numbers[name]
 
     def integrate(self, q: Array, step: Array) -> Array:
-        """Configuration reached from q along a tangent vector, shape (nv,)."""
+        """Return the configuration reached from q along a tangent vector, shape (nv,)."""
         return pin.integrate(self.model, q, step)
 
     @property
@@ -82,9 +82,12 @@ class Plant:
         return tuple(self._bodies)
 
     def body_poses(self, q: Array) -> dict[str, Array]:
-        """Pose of each passive body, by name: x, y, z, quaternion x, y, z, w, shape (7,).
+        """Return the pose of each passive body, by name.
 
-        A door's is that of its hinge.
+        The pose of a door is that of its hinge.
+
+        Returns:
+            Poses x, y, z, quaternion x, y, z, w, shape (7,) each.
         """
         pin.forwardKinematics(self.model, self._data, q)
         return {
@@ -92,18 +95,18 @@ class Plant:
         }
 
     def chart_velocity(self, q_0: Array, q: Array, v: Array) -> Array:
-        """Rate of the tangent vector from q_0 to q, shape (nv,); v itself on flat joints."""
+        """Return the rate of the tangent vector from q_0 to q, shape (nv,); v on flat joints."""
         if not self._curved:
             return v
         return pin.dDifference(self.model, q_0, q, pin.ARG1) @ v
 
-    def outside(self, q: Array, v: Array, pushes: Sequence[Push] = ()) -> ExternalLoads:
-        """What couplings and pushes do at a state of the plant."""
-        none = np.zeros(self.model.nv)
+    def external_loads(self, q: Array, v: Array, pushes: Sequence[Push] = ()) -> ExternalLoads:
+        """Compute the loads of couplings and pushes at a state of the plant."""
+        zero = np.zeros(self.model.nv)
         if not self.couplings and not pushes:
-            return ExternalLoads(none, none, ())
+            return ExternalLoads(zero, zero, ())
         pin.computeJointJacobians(self.model, self._data, q)
-        coupling_torque, effects = none.copy(), []
+        coupling_torque, effects = zero.copy(), []
         for coupling, frames in zip(self.couplings, self._frames, strict=True):
             jacobians = [self._jacobian(frame) for frame in frames]
             motions = [self._motion(*pair, v) for pair in zip(frames, jacobians, strict=True)]
@@ -111,7 +114,7 @@ class Plant:
             effects.append(effect)
             for J, wrench in zip(jacobians, effect.wrenches, strict=True):
                 coupling_torque += J.T @ wrench
-        push_torque = none.copy()
+        push_torque = zero.copy()
         for push in pushes:
             J = self._jacobian(self._frame(push.frame))
             push_torque += J.T @ self._in_world_axes(push)
@@ -132,9 +135,9 @@ class Plant:
         return np.concatenate([R @ push.wrench[:3], R @ push.wrench[3:]])
 
     def tool_wrenches(self, q: Array, v: Array, pushes: Sequence[Push] = ()) -> Array:
-        """What couplings and pushes exert on each tool, world axes, shape (N, 6) [N, N m]."""
+        """Return the wrench of couplings and pushes on each tool, world axes, (N, 6) [N, N m]."""
         wrenches = np.zeros((len(self.team.robots), 6))
-        effects = self.outside(q, v, pushes).effects
+        effects = self.external_loads(q, v, pushes).effects
         acting = [(push.frame, self._in_world_axes(push)) for push in pushes]
         for coupling, effect in zip(self.couplings, effects, strict=True):
             acting += zip(coupling.frames, effect.wrenches, strict=True)
@@ -144,9 +147,9 @@ class Plant:
         return wrenches
 
     def acceleration(self, q: Array, v: Array, torque: Array) -> Array:
-        """Acceleration under a generalised force, shape (nv,)."""
+        """Return the acceleration under a generalised force, shape (nv,)."""
         return pin.aba(self.model, self._data, q, v, torque).copy()
 
     def mechanical_energy(self, q: Array, v: Array) -> float:
-        """Kinetic energy plus potential energy in gravity [J]."""
+        """Return kinetic energy plus potential energy in gravity [J]."""
         return float(pin.computeMechanicalEnergy(self.model, self._data, q, v))

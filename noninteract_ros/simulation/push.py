@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A person or an object pushing a robot, at its tool point or anywhere else on it."""
+"""Pushes on a robot, at its tool point or at any other frame."""
 
 from dataclasses import dataclass
 
@@ -10,17 +10,17 @@ from noninteract_ros.errors import ScenarioError, one_of
 from noninteract_ros.schema import join, key
 from noninteract_ros.team.team import Team
 
-RESOLUTION = 1e-9  # [s] what lies less apart is the same instant
+RESOLUTION = 1e-9  # Times closer than this are the same instant [s].
 
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """A wrench that acts on a robot now.
+    """A wrench that acts on a robot at an instant.
 
     Attributes:
-        frame: Full name of the frame at whose origin it acts, `<robot>/<frame>`.
+        frame: Full name of the frame at whose origin the wrench acts, `<robot>/<frame>`.
         wrench: Force and torque, shape (6,) [N, N m].
-        in_frame_axes: Whether it is given in axes of the frame instead of the world.
+        in_frame_axes: True if the wrench is in axes of the frame instead of the world.
     """
 
     frame: str
@@ -30,41 +30,41 @@ class Push:
 
 @dataclass(frozen=True)
 class ScheduledPush:
-    """Configuration block of a push that the scenario itself gives.
+    """Configuration block of a scheduled push.
 
-    What acts elsewhere than on the tool is not in the robot's `external_wrench`: no sensor at
-    the tool feels it.
+    A push elsewhere than on the tool is not part of the robot's `external_wrench`, since a sensor
+    at the tool does not measure it.
     """
 
-    robot: str = key("Robot that is pushed")
-    start: float = key("When it begins [s]", minimum=0.0)
-    duration: float = key("How long it lasts [s]", positive=True)
+    robot: str = key("Pushed robot")
+    start: float = key("Start time [s]", minimum=0.0)
+    duration: float = key("Duration [s]", positive=True)
     force: tuple[float, ...] = key("Force, world axes x, y, z [N]")
     torque: tuple[float, ...] = key("Torque, world axes x, y, z [N m]", (0.0, 0.0, 0.0))
     frame: str = key(
-        "Link, joint or frame of the robot at whose origin it acts; by default its tool", ""
+        "Link, joint or frame of the robot at whose origin the push acts; by default its tool", ""
     )
 
     def wrench(self, now: float) -> Array:
-        """Wrench at a time, shape (6,) [N, N m]."""
-        acts = -RESOLUTION < now - self.start < self.duration - RESOLUTION
-        return np.array([*self.force, *self.torque]) if acts else np.zeros(6)
+        """Return the wrench at a time [s], shape (6,) [N, N m]."""
+        active = -RESOLUTION < now - self.start < self.duration - RESOLUTION
+        return np.array([*self.force, *self.torque]) if active else np.zeros(6)
 
     def on_tool(self, team: Team) -> bool:
-        """Whether it acts on the robot's tool."""
+        """Return True if the push acts on the robot's tool."""
         return self.frame in ("", team.robots[team.index(self.robot)].tool_frame)
 
     def frame_name(self, team: Team) -> str:
-        """Full name of the frame at whose origin it acts."""
+        """Return the full name of the frame at whose origin the push acts."""
         tool = team.robots[team.index(self.robot)].tool_frame
         return f"{self.robot}/{self.frame or tool}"
 
     def check(self, name: str, team: Team) -> None:
-        """Refuses what does not fit the team.
+        """Check the push against the team.
 
         Raises:
-            ScenarioError: The robot or its frame is unknown, or the force or the torque has not
-                three components.
+            ScenarioError: The robot or its frame is unknown, or the force or the torque does not
+                have three components.
         """
         if self.robot not in team.names:
             allowed = one_of(team.names, self.robot)
@@ -80,11 +80,11 @@ class ScheduledPush:
 
 @dataclass(frozen=True, slots=True)
 class LivePush:
-    """The newest push that came from outside; it lapses when it is not repeated.
+    """Newest received push on a robot; it expires unless it is repeated.
 
     Attributes:
-        push: What it does.
-        until: Time at which it lapses [s].
+        push: The push.
+        until: Time of expiry [s].
     """
 
     push: Push

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The object of the paper's Section V: a mass and a stiffness at subtask level."""
+"""Object of the paper's Section V: a mass and a stiffness at subtask level."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -18,15 +18,15 @@ SIGNS = {"physical": -1.0, "paper": 1.0}
 
 @dataclass(frozen=True)
 class ObjectSettings:
-    """Configuration block of the object that the team holds."""
+    """Configuration block of the object held by the team."""
 
-    mass: float = key("Mass m_o that the carrying subtask moves [kg]", 0.0, minimum=0.0)
-    stiffness: float = key("Stiffness k_o that the grasping subtask strains [N/m]", 0.0, minimum=0)
-    rest: tuple[float, ...] = key("Value of the grasping subtask without strain [m]", ())
+    mass: float = key("Mass m_o moved by the carrying subtask [kg]", 0.0, minimum=0.0)
+    stiffness: float = key("Stiffness k_o strained by the grasping subtask [N/m]", 0.0, minimum=0)
+    rest: tuple[float, ...] = key("Unstrained value of the grasping subtask [m]", ())
     carried_by: str = key("Subtask that carries the mass", "cooperative")
     grasped_by: str = key("Subtask that strains the stiffness", "relative")
     sign: str = key(
-        "physical: inertia and spring oppose the motion; paper: the sign that Section V prints",
+        "physical: inertia and spring oppose the motion; paper: sign as printed in Section V",
         "physical",
         choices=tuple(SIGNS),
     )
@@ -40,7 +40,7 @@ class SubtaskObject:
         stack: The team's subtasks.
 
     Raises:
-        ScenarioError: A subtask is unknown, it rotates, or `rest` does not fit it.
+        ScenarioError: A subtask is unknown or has rotations, or `rest` does not have its size.
     """
 
     def __init__(self, settings: ObjectSettings, stack: SubtaskStack) -> None:
@@ -49,7 +49,7 @@ class SubtaskObject:
             if found not in stack.names:
                 raise ScenarioError(f"object.{name}", repr(found), one_of(stack.names, found))
             if stack.subtasks[stack.names.index(found)].rotates:
-                allowed = "a subtask without rotations: the object is one of positions"
+                allowed = "a subtask without rotations"
                 raise ScenarioError(f"object.{name}", repr(found), allowed)
         self._stack = stack
         self._terms = Memo(self._compute_terms)
@@ -63,12 +63,15 @@ class SubtaskObject:
         self._mass, self._stiffness = sign * settings.mass, sign * settings.stiffness
         self._rest = np.array(settings.rest) if settings.stiffness else np.zeros(dim)
 
-    def accelerate(self, state: TeamState, load: Array) -> tuple[Array, Array]:
-        """Acceleration of a team that holds the object, and the object's torque, shape (n,) each.
+    def acceleration(self, state: TeamState, load: Array) -> tuple[Array, Array]:
+        """Return the acceleration of the team with the object, and the object's torque.
 
         Args:
-            state: Where the team is.
-            load: Every other torque but Coriolis and gravity torques, shape (n,) [N or N m].
+            state: State of the team.
+            load: All other torques except Coriolis and gravity torques, shape (n,) [N or N m].
+
+        Returns:
+            Acceleration and torque, shape (n,) each.
         """
         terms, b = self._terms_at(state)
         free = load - state.C @ state.v - state.g
@@ -76,7 +79,7 @@ class SubtaskObject:
         return acceleration, terms.A @ acceleration + b
 
     def torque_terms(self, state: TeamState) -> tuple[Array, Array]:
-        """A (n, n) and b (n,) of its torque A dv/dt + b: the mass feels the acceleration."""
+        """Return A (n, n) and b (n,) of the object's torque A dv/dt + b."""
         terms, b = self._terms_at(state)
         return terms.A, b
 
@@ -97,7 +100,7 @@ class SubtaskObject:
 
 
 class _Terms(NamedTuple):
-    """What follows from M and J: A and its part with J_rate, Gamma_r, and (M - A)^-1."""
+    """Terms of M and J: A and its part with J_rate, Gamma_r, and (M - A)^-1."""
 
     A: Array
     A_rate: Array
@@ -106,6 +109,6 @@ class _Terms(NamedTuple):
 
 
 def _decoupling_columns(M: Array, S_i: Array) -> Array:
-    """Columns M S_i (S_i' M S_i)^-1 of Gamma of one subtask, shape (n, p_i)."""
+    """Return the columns M S_i (S_i' M S_i)^-1 of Gamma of one subtask, shape (n, p_i)."""
     MS_i = M @ S_i
     return np.linalg.solve(S_i.T @ MS_i, MS_i.T).T

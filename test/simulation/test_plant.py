@@ -201,7 +201,7 @@ def door_swing(damping: float) -> float:
     v[-1] = 2.0
 
     def derivative(q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        load = plant.outside(q, v).coupling_torque - plant.friction * v
+        load = plant.external_loads(q, v).coupling_torque - plant.friction * v
         return plant.acceleration(q, v, load), np.zeros(0)
 
     for _ in range(100):
@@ -264,7 +264,7 @@ def test_reported_wrenches_are_what_the_grips_exert():
     np.testing.assert_allclose(found[:, :3], expected, atol=1e-9)
     assert not found[:, 3:].any()
     # The door feels the opposite: its torque is that of the handles about the hinge.
-    torque = plant.outside(simulation.plant_q, simulation._v).coupling_torque
+    torque = plant.external_loads(simulation.plant_q, simulation._v).coupling_torque
     assert torque[-1] == pytest.approx(-np.cross(arm, expected).sum(axis=0) @ axis)
 
 
@@ -344,7 +344,7 @@ def test_bodies_leave_the_team_s_coordinates_alone():
     assert tuple(plant.model.names[1 : team.n + 1]) == team.joint_names
     np.testing.assert_array_equal(plant.model.armature[: team.n], team.model.armature)
     np.testing.assert_array_equal(plant.q0[: team.n], team.q0)
-    outside = plant.outside(plant.q0, np.zeros(plant.model.nv))
+    outside = plant.external_loads(plant.q0, np.zeros(plant.model.nv))
     np.testing.assert_allclose(outside.coupling_torque, 0.0, atol=1e-9)
     assert len(plant.couplings) == 1
     rng = np.random.default_rng(0)

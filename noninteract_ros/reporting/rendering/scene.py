@@ -147,7 +147,7 @@ class Scene:
     def _force(self, whole: Array) -> Array:
         """What acts on the bodies at rest, shape (m,) [N or N m]."""
         plant = self.plant
-        couplings = plant.outside(whole, np.zeros(plant.model.nv)).coupling_torque
+        couplings = plant.external_loads(whole, np.zeros(plant.model.nv)).coupling_torque
         gravity = pin.computeGeneralizedGravity(plant.model, self._data, whole)
         return (couplings - gravity)[self.team.n :]
 
