@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The operator console without ROS: web server, protocol and driving."""
+"""Operator console without ROS: web server, page protocol, scene and reference generation."""

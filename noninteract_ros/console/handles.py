@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where each subtask can be taken hold of, and what can be driven."""
+"""Handles of the subtasks: drivable subtasks and poses of their handles."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.console.drive import AXES, NO_TURN, Drivable
+from noninteract_ros.console.drive import AXES, IDENTITY_ROTATION, DrivableSubtask
 from noninteract_ros.control.law.impedance import spread
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.sources.human.input_settings import OperatorSettings
@@ -22,44 +22,46 @@ WORLD = "world"
 POSTURES = (JointSelection, ElbowAngles)
 
 
-def drivables(scenario: Scenario, stack: SubtaskStack) -> dict[str, Drivable]:
-    """The subtasks that can be driven; postures are no places, so they have no handle.
+def drivable_subtasks(scenario: Scenario, stack: SubtaskStack) -> dict[str, DrivableSubtask]:
+    """Return the subtasks that an operator can drive, by name.
 
-    The speeds of the block `operator` bound all of them, its workspace the one that it names.
+    Postures have no handle, because their values are not positions. The speeds of the block
+    `operator` bound all subtasks; its workspace bounds the one that it names.
     """
     settings = scenario.operator or OperatorSettings()
     found = {}
     for task in stack.subtasks:
         if isinstance(task, POSTURES):
             continue
-        led = scenario.subtasks[task.name].input
+        bounds = scenario.subtasks[task.name].input
         names = ("max_velocity", "max_acceleration", "max_jerk")
-        limits = np.array([spread(task, name, getattr(led, name)) for name in names])
+        limits = np.array([spread(task, name, getattr(bounds, name)) for name in names])
         layout = task.layout
-        bound = np.full(layout.dim, settings.linear_speed)
-        bound[layout.angular.ravel()] = settings.angular_speed
-        limits[0] = np.minimum(limits[0], bound)
-        found[task.name] = Drivable(
-            len(task.elements),
-            tuple(task.axes),
-            task.rotates,
-            limits,
-            settings.linear_speed,
-            settings.angular_speed,
-            Workspace(settings, task, limits) if task.name == settings.subtask else None,
+        speed = np.full(layout.dim, settings.linear_speed)
+        speed[layout.angular.ravel()] = settings.angular_speed
+        limits[0] = np.minimum(limits[0], speed)
+        in_workspace = task.name == settings.subtask
+        found[task.name] = DrivableSubtask(
+            elements=len(task.elements),
+            axes=tuple(task.axes),
+            rotates=task.rotates,
+            limits=limits,
+            linear_speed=settings.linear_speed,
+            angular_speed=settings.angular_speed,
+            workspace=Workspace(settings, task, limits) if in_workspace else None,
         )
     return found
 
 
 @dataclass(frozen=True)
 class Handles:
-    """Poses of the handles of one subtask.
+    """Handles of one subtask, one per element.
 
-    Args:
+    Attributes:
         task: The subtask.
-        frame: Subtask whose rotation is that of its frame; `world` for none.
-        robots: For each element, the robot that carries the handle: the first of an edge; None,
-            where the value itself is a place.
+        frame: Subtask whose rotation is the frame of this one, or `world`.
+        robots: Index of the robot whose tool carries the handle, for each element: the first of
+            an edge. None where the value itself is a position.
     """
 
     task: Subtask
@@ -68,14 +70,14 @@ class Handles:
 
     @classmethod
     def of(cls, task: Subtask, scenario: Scenario, team: Team) -> "Handles":
-        """Handles of a subtask of a scenario."""
+        """Return the handles of a subtask of a scenario."""
         frame = getattr(scenario.subtasks[task.name].kind, "frame", WORLD)
         firsts = [element.split("-")[0] for element in task.elements]
         robots = [team.index(name) if name in team.names else None for name in firsts]
         return cls(task, frame, tuple(robots))
 
-    def described(self) -> list[dict[str, Any]]:
-        """For the page: name, axes and rotation of each element's handle."""
+    def describe(self) -> list[dict[str, Any]]:
+        """Return index, label, axes and rotation of each handle for the greeting."""
         return [
             {
                 "element": number,
@@ -87,11 +89,11 @@ class Handles:
         ]
 
     def poses(self, value: Array, frame: Array, tools: Array) -> Array:
-        """Pose of each handle in the world, shape (elements, 7).
+        """Return the pose of each handle in the world, shape (elements, 7).
 
         Args:
             value: Value of the subtask, shape (size,).
-            frame: Quaternion of its frame.
+            frame: Quaternion of the subtask's frame in the world.
             tools: Tool points, shape (N, 3) [m].
         """
         count = len(self.task.axes)
@@ -99,18 +101,18 @@ class Handles:
         poses = np.empty((len(self.robots), 7))
         for number, robot in enumerate(self.robots):
             part = value[number * size : (number + 1) * size]
-            # Where a subtask has no place along an axis, its handle is in the middle of the team.
+            # Along axes that the subtask does not have, the handle is at the centre of the team.
             poses[number, :3] = tools.mean(axis=0) if robot is None else tools[robot]
             poses[number, 3:] = frame
             if robot is None:
                 poses[number, [AXES.index(axis) for axis in self.task.axes]] = part[:count]
-                poses[number, 3:] = part[count:] if self.task.rotates else NO_TURN
+                poses[number, 3:] = part[count:] if self.task.rotates else IDENTITY_ROTATION
         return poses
 
 
 def rotation_of(task: Subtask, value: Array | None) -> Array:
-    """Quaternion of a subtask's first element; no turn, where it has none."""
+    """Return the quaternion of a subtask's first element; the identity where it has none."""
     if value is None or not task.rotates:
-        return NO_TURN
+        return IDENTITY_ROTATION
     count = len(task.axes)
     return value[count : count + 4]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pages may say: one JSON object a message, checked whole; anything else ends the talk."""
+"""Messages from pages: one JSON object each; an invalid message closes the connection."""
 
 import json
 import math
@@ -9,21 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from noninteract_ros.console.page_input import Held, PageDrag, PagePush
+from noninteract_ros.console.held_input import HeldInput, PageDrag, PageTwist
 from noninteract_ros.errors import InputError
 from noninteract_ros.subtasks.layout import UNIT_TOLERANCE
 
-VERSION = 1
-LONGEST_TEXT = 128
-MOST_NUMBERS = 256
-MOST_GRABS = 2**31
-FARTHEST = 1000.0  # [m]
+VERSION = 2
+MAX_TEXT_LENGTH = 128
+MAX_GAINS = 256
+MAX_COUNT = 2**31
+MAX_DISTANCE = 1000.0  # [m]
 
 Check = Callable[[Any], bool]
 
 
 def _text(value: Any) -> bool:
-    return isinstance(value, str) and len(value) <= LONGEST_TEXT
+    return isinstance(value, str) and len(value) <= MAX_TEXT_LENGTH
 
 
 def _flag(value: Any) -> bool:
@@ -31,7 +31,7 @@ def _flag(value: Any) -> bool:
 
 
 def _count(value: Any) -> bool:
-    return type(value) is int and 0 <= value < MOST_GRABS
+    return type(value) is int and 0 <= value < MAX_COUNT
 
 
 def _number(value: Any, bound: float) -> bool:
@@ -53,7 +53,7 @@ def _quaternion(value: Any) -> bool:
 def _gains(value: Any) -> bool:
     return (
         isinstance(value, list)
-        and 1 <= len(value) <= MOST_NUMBERS
+        and 1 <= len(value) <= MAX_GAINS
         and all(_number(item, 1e9) for item in value)
     )
 
@@ -64,17 +64,17 @@ def _one_of(*names: str) -> Check:
 
 KINDS: dict[str, dict[str, Check]] = {
     "hello": {"version": _count, "token": _text},
-    "beat": {},
-    "take": {},
-    "leave": {},
+    "heartbeat": {},
+    "take_control": {},
+    "release_control": {},
     "drag": {
         "subtask": _text,
         "element": _count,
         "grab": _count,
-        "by": _numbers(3, FARTHEST),
-        "turn": _quaternion,
+        "translation": _numbers(3, MAX_DISTANCE),
+        "rotation": _quaternion,
     },
-    "push": {
+    "twist": {
         "subtask": _text,
         "element": _count,
         "grab": _count,
@@ -96,11 +96,11 @@ KINDS: dict[str, dict[str, Check]] = {
 
 @dataclass(frozen=True, slots=True)
 class PageCommand:
-    """A message that has the right form.
+    """A valid message of a page.
 
     Attributes:
         kind: One of `KINDS`.
-        values: What the kind has.
+        values: Values of the kind's keys.
     """
 
     kind: str
@@ -108,45 +108,53 @@ class PageCommand:
 
 
 def parse(data: str | bytes) -> PageCommand:
-    """A page's message.
+    """Parse a message of a page.
 
     Raises:
-        InputError: It has not the form of any kind.
+        InputError: The message does not have the form of any kind.
     """
     if not isinstance(data, str):
         raise InputError("binary message")
     try:
-        content = json.loads(data, parse_constant=_refuse)
+        content = json.loads(data, parse_constant=_reject_constant)
     except (ValueError, RecursionError) as error:
-        raise InputError("no JSON") from error
+        raise InputError("not JSON") from error
     if not isinstance(content, dict):
-        raise InputError("no object")
+        raise InputError("not a JSON object")
     kind = content.pop("kind", None)
     if not isinstance(kind, str) or kind not in KINDS:
         raise InputError("unknown kind")
     checks = KINDS[kind]
     if content.keys() != checks.keys():
-        raise InputError(f"{kind} with other keys")
+        raise InputError(f"{kind}: missing or unknown keys")
     for name, check in checks.items():
         if not check(content[name]):
-            raise InputError(f"{kind} with a wrong {name}")
+            raise InputError(f"{kind}: invalid {name}")
     return PageCommand(kind, content)
 
 
-def held(said: PageCommand) -> Held | None:
-    """What a message says is held; None where it says something else."""
-    values = said.values
-    if said.kind == "drag":
-        turn = np.array(values["turn"], dtype=float)
-        by = np.array(values["by"], dtype=float)
-        unit = turn / np.linalg.norm(turn)
-        return PageDrag(values["subtask"], values["element"], values["grab"], by, unit)
-    if said.kind == "push":
-        linear = np.array(values["linear"], dtype=float)
-        angular = np.array(values["angular"], dtype=float)
-        return PagePush(values["subtask"], values["element"], values["grab"], linear, angular)
+def held_input(command: PageCommand) -> HeldInput | None:
+    """Return the input that a message holds, or None if it is a message of another kind."""
+    values = command.values
+    if command.kind == "drag":
+        rotation = np.array(values["rotation"], dtype=float)
+        return PageDrag(
+            subtask=values["subtask"],
+            element=values["element"],
+            grab=values["grab"],
+            translation=np.array(values["translation"], dtype=float),
+            rotation=rotation / np.linalg.norm(rotation),
+        )
+    if command.kind == "twist":
+        return PageTwist(
+            subtask=values["subtask"],
+            element=values["element"],
+            grab=values["grab"],
+            linear=np.array(values["linear"], dtype=float),
+            angular=np.array(values["angular"], dtype=float),
+        )
     return None
 
 
-def _refuse(constant: str) -> Any:
+def _reject_constant(constant: str) -> Any:
     raise ValueError(constant)

@@ -19,20 +19,19 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from noninteract_ros.console.driver_lock import DriverLock
-from noninteract_ros.console.limits import RateLimit
-from noninteract_ros.console.page_input import Held
-from noninteract_ros.console.protocol import VERSION, PageCommand, held, parse
-from noninteract_ros.console.site import HEADERS, AccessPolicy, load_site
+from noninteract_ros.console.held_input import HeldInput
+from noninteract_ros.console.protocol import VERSION, PageCommand, held_input, parse
+from noninteract_ros.console.site import HEADERS, AccessPolicy, RateLimit, load_static_files
 from noninteract_ros.errors import InputError, ScenarioError
 from noninteract_ros.scenario.console_settings import ConsoleSettings
 
 SOCKET = "/socket"
-HELLO_TIMEOUT = 3.0  # [s] given to a page to say who it is
-SLOW = 2**18  # [bytes] that wait for a page before pictures are left out for it
-SEAT_TIMEOUT = 5.0  # [s] of silence after which the driver's seat is free
-POLICY, BUSY = 1008, 1013  # codes that a WebSocket is closed with
+HELLO_TIMEOUT = 3.0  # [s] for the first message of a page
+MAX_BACKLOG = 2**18  # [bytes] waiting for a page, above which frames are dropped for it
+DRIVER_TIMEOUT = 5.0  # [s] without a message, after which the driver loses the lock
+POLICY, BUSY = 1008, 1013  # WebSocket close codes
 START_TIMEOUT = 10.0  # [s]
-FOR_DRIVERS = {
+DRIVER_COMMANDS = {
     "resume",
     "authority",
     "law",
@@ -44,17 +43,17 @@ FOR_DRIVERS = {
 }
 
 
-class Host(Protocol):
-    """What the server serves; called in the server's thread."""
+class ConsoleBackend(Protocol):
+    """Interface between the server and the console; called in the server's thread."""
 
     def greeting(self) -> list[str | bytes]:
-        """What a page is told first."""
+        """Return the messages that open a connection."""
 
-    def knows(self, item: Held) -> bool:
-        """Whether there is such a thing to hold."""
+    def accepts(self, held: HeldInput) -> bool:
+        """Return True if the subtask and element of an input can be driven."""
 
-    def command(self, page: int, said: PageCommand) -> None:
-        """A page asks for something; what comes of it is told later."""
+    def enqueue(self, page: int, command: PageCommand) -> None:
+        """Queue a command of a page; the response is sent later."""
 
 
 @dataclass(eq=False)
@@ -62,49 +61,53 @@ class Page:
     """One open page.
 
     Attributes:
-        number: Its number.
+        number: Number of the page.
         socket: Its connection.
-        allowance: How much more it may send.
+        rate_limit: Limit of its messages.
     """
 
     number: int
     socket: ServerConnection
-    allowance: RateLimit = field(repr=False)
+    rate_limit: RateLimit = field(repr=False)
 
 
 class ConsoleServer:
-    """Serves the page, lets pages in, hears them, tells them.
+    """HTTP and WebSocket server of the page.
 
     Args:
-        settings: Where to listen, and the limits.
-        token: What pages must know; an empty text, where none is demanded.
-        seat: Who drives.
-        host: What is served.
+        settings: Address and limits.
+        token: Token that pages must send; empty where none is required.
+        lock: Driver lock.
+        backend: Console behind the server.
+
+    Attributes:
+        port: Port that the server listens on.
+        rejected: Number of rejected requests and connections.
     """
 
     def __init__(
-        self, settings: ConsoleSettings, token: str, seat: DriverLock, host: Host
+        self, settings: ConsoleSettings, token: str, lock: DriverLock, backend: ConsoleBackend
     ) -> None:
-        self._settings, self._token, self._seat, self._host = settings, token, seat, host
-        self._site = load_site()
-        self._door = AccessPolicy(settings)
+        self._settings, self._token, self._lock, self._backend = settings, token, lock, backend
+        self._files = load_static_files()
+        self._access = AccessPolicy(settings)
         self._pages: dict[int, Page] = {}
-        self._sockets = self._next = 0
+        self._connections = self._last_number = 0
         self._loop = asyncio.new_event_loop()
-        self._ended = asyncio.Event()
+        self._stopped = asyncio.Event()
         self._started = threading.Event()
         self._failure: OSError | None = None
         self._thread = threading.Thread(target=self._run, daemon=True, name="console server")
         self.port = settings.port
-        self.refused = 0
+        self.rejected = 0
 
     @property
     def pages(self) -> int:
-        """How many pages are open."""
+        """Number of open pages."""
         return len(self._pages)
 
     def start(self) -> None:
-        """Listens.
+        """Start listening.
 
         Raises:
             ScenarioError: The address cannot be used.
@@ -116,18 +119,18 @@ class ConsoleServer:
             raise ScenarioError("console.port", found, "a free port; 0: any") from self._failure
 
     def stop(self) -> None:
-        """Closes all pages and ends the thread."""
+        """Close all pages and end the thread."""
         if self._loop.is_running():
-            self._loop.call_soon_threadsafe(self._ended.set)
+            self._loop.call_soon_threadsafe(self._stopped.set)
         self._thread.join(START_TIMEOUT)
 
-    def tell_all(self, data: str | bytes) -> None:
-        """Tells all pages; those that do not keep up miss it. From any thread."""
+    def broadcast(self, data: str | bytes) -> None:
+        """Send to all pages that keep up; callable from any thread."""
         if self._pages and self._loop.is_running():
             self._loop.call_soon_threadsafe(self._broadcast, data)
 
-    def tell(self, page: int, content: Mapping[str, Any]) -> None:
-        """Tells one page. From any thread."""
+    def send(self, page: int, content: Mapping[str, Any]) -> None:
+        """Send a JSON message to one page; callable from any thread."""
         if self._loop.is_running():
             self._loop.call_soon_threadsafe(self._send, page, json.dumps(content))
 
@@ -142,14 +145,14 @@ class ConsoleServer:
             self._loop.close()
 
     async def _serve(self) -> None:
-        quiet = logging.getLogger("noninteract_ros.console")
-        quiet.addHandler(logging.NullHandler())
-        quiet.propagate = False  # What strangers send must not fill logs.
+        logger = logging.getLogger("noninteract_ros.console")
+        logger.addHandler(logging.NullHandler())
+        logger.propagate = False  # Unauthenticated clients must not fill logs.
         async with serve(
-            self._talk,
+            self._handle_connection,
             self._settings.host,
             self._settings.port,
-            process_request=self._answer,
+            process_request=self._handle_request,
             max_size=self._settings.max_message,
             max_queue=16,
             compression=None,
@@ -157,123 +160,125 @@ class ConsoleServer:
             ping_timeout=10.0,
             close_timeout=1.0,
             server_header=None,
-            logger=quiet,
+            logger=logger,
         ) as server:
             self.port = next(iter(server.sockets)).getsockname()[1]
             self._started.set()
-            await self._ended.wait()
+            await self._stopped.wait()
 
-    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Plain requests; None lets a WebSocket through."""
+    def _handle_request(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Respond to an HTTP request; None lets a WebSocket handshake continue."""
         host = request.headers.get("Host")
-        if not self._door.knows_host(host):
-            return self._refused(HTTPStatus.MISDIRECTED_REQUEST, "unknown host\n")
+        if not self._access.allows_host(host):
+            return self._reject(HTTPStatus.MISDIRECTED_REQUEST, "unknown host\n")
         path = urlsplit(request.path).path
         if path == SOCKET:
-            if not self._door.knows_origin(request.headers.get("Origin"), host):
-                return self._refused(HTTPStatus.FORBIDDEN, "foreign origin\n")
+            if not self._access.allows_origin(request.headers.get("Origin"), host):
+                return self._reject(HTTPStatus.FORBIDDEN, "foreign origin\n")
             return None
-        if path not in self._site:
+        if path not in self._files:
             return _response(HTTPStatus.NOT_FOUND, "text/plain", b"not found\n")
-        return _response(HTTPStatus.OK, *self._site[path])
+        return _response(HTTPStatus.OK, *self._files[path])
 
-    def _refused(self, status: HTTPStatus, text: str) -> Response:
-        self.refused += 1
+    def _reject(self, status: HTTPStatus, text: str) -> Response:
+        self.rejected += 1
         return _response(status, "text/plain", text.encode())
 
-    async def _talk(self, socket: ServerConnection) -> None:
-        self._sockets += 1
+    async def _handle_connection(self, socket: ServerConnection) -> None:
+        self._connections += 1
         try:
-            if self._sockets > self._settings.max_pages:
-                await self._dismiss(socket, "too many pages", BUSY)
-            elif await self._is_known(socket):
-                await self._attend(socket)
+            if self._connections > self._settings.max_pages:
+                await self._close(socket, "too many pages", BUSY)
+            elif await self._authenticate(socket):
+                await self._handle_page(socket)
         except ConnectionClosed as end:
-            self.refused += end.sent is not None and end.sent.code != 1000
+            self.rejected += end.sent is not None and end.sent.code != 1000
         finally:
-            self._sockets -= 1
+            self._connections -= 1
 
-    async def _is_known(self, socket: ServerConnection) -> bool:
-        """Whether a page introduces itself as it has to."""
+    async def _authenticate(self, socket: ServerConnection) -> bool:
+        """Return True if the first message is a hello of this version with the token."""
         try:
             async with asyncio.timeout(HELLO_TIMEOUT):
-                said = parse(await socket.recv())
+                hello = parse(await socket.recv())
         except (TimeoutError, InputError) as error:
-            await self._dismiss(socket, str(error) or "no hello")
+            await self._close(socket, str(error) or "no hello")
             return False
-        given = said.values.get("token", "")
-        if said.kind != "hello" or said.values["version"] != VERSION:
-            await self._dismiss(socket, "no hello of this version: load the page again")
-        elif self._token and not hmac.compare_digest(given.encode(), self._token.encode()):
-            await self._dismiss(socket, "wrong token")
+        token = hello.values.get("token", "")
+        if hello.kind != "hello" or hello.values["version"] != VERSION:
+            await self._close(socket, "no hello of this version: reload the page")
+        elif self._token and not hmac.compare_digest(token.encode(), self._token.encode()):
+            await self._close(socket, "wrong token")
         else:
             return True
         return False
 
-    async def _dismiss(self, socket: ServerConnection, reason: str, code: int = POLICY) -> None:
-        self.refused += 1
+    async def _close(self, socket: ServerConnection, reason: str, code: int = POLICY) -> None:
+        self.rejected += 1
         await socket.close(code, reason[:120])
 
-    async def _attend(self, socket: ServerConnection) -> None:
-        self._next += 1
-        page = Page(self._next, socket, RateLimit(self._settings.max_message_rate))
-        for item in self._host.greeting():
+    async def _handle_page(self, socket: ServerConnection) -> None:
+        self._last_number += 1
+        rate_limit = RateLimit(self._settings.max_message_rate)
+        page = Page(number=self._last_number, socket=socket, rate_limit=rate_limit)
+        for item in self._backend.greeting():
             await socket.send(item)
-        await socket.send(json.dumps({"kind": "you", "page": page.number}))
+        await socket.send(json.dumps({"kind": "welcome", "page": page.number}))
         self._pages[page.number] = page
         try:
             async for data in socket:
-                reason = self._hear(page, data)
+                reason = self._handle_message(page, data)
                 if reason:
-                    await self._dismiss(socket, reason)
+                    await self._close(socket, reason)
                     return
         finally:
             del self._pages[page.number]
-            self._seat.leave(page.number)
+            self._lock.release(page.number)
 
-    def _hear(self, page: Page, data: str | bytes) -> str:
-        """Takes a message; the reason to end the talk, or an empty text."""
+    def _handle_message(self, page: Page, data: str | bytes) -> str:
+        """Process a message; return the reason to close the connection, or an empty text."""
         now = time.monotonic()
-        if not page.allowance.take(now):
+        if not page.rate_limit.accept(now):
             return "too many messages"
         try:
-            said = parse(data)
-            holding = held(said)
+            command = parse(data)
+            held = held_input(command)
         except InputError as error:
             return str(error)
-        if holding is not None and not self._host.knows(holding):
-            return f"{said.kind} of nothing that can be driven"
-        self._seat.heard(page.number, now)
-        if holding is not None:
-            self._seat.hold(page.number, holding, now)
-        elif said.kind != "beat":
-            self._obey(page, said, now)
+        if held is not None and not self._backend.accepts(held):
+            return f"{command.kind}: not a drivable subtask"
+        self._lock.refresh(page.number, now)
+        if held is not None:
+            self._lock.hold_input(page.number, held, now)
+        elif command.kind != "heartbeat":
+            self._handle_command(page, command, now)
         return ""
 
-    def _obey(self, page: Page, said: PageCommand, now: float) -> None:
+    def _handle_command(self, page: Page, command: PageCommand, now: float) -> None:
         number = page.number
-        if said.kind == "release":
-            self._seat.release(number)
-        elif said.kind == "take":
-            before = self._seat.take(number, now)
+        if command.kind == "release":
+            self._lock.release_input(number)
+        elif command.kind == "take_control":
+            before = self._lock.acquire(number, now)
             if before is not None:
-                text = "another page has taken over"
-                self.tell(before, {"kind": "answer", "ok": False, "text": text})
-        elif said.kind == "leave":
-            self._seat.leave(number)
-        elif said.kind in FOR_DRIVERS and number != self._seat.driver:
-            text = f"{said.kind}: take control first"
-            self.tell(number, {"kind": "answer", "ok": False, "text": text})
-        elif said.kind in FOR_DRIVERS or said.kind == "stop":
-            self._host.command(number, said)
+                text = "another page has taken control"
+                self.send(before, {"kind": "response", "ok": False, "text": text})
+        elif command.kind == "release_control":
+            self._lock.release(number)
+        elif command.kind in DRIVER_COMMANDS and number != self._lock.driver:
+            text = f"{command.kind}: take control first"
+            self.send(number, {"kind": "response", "ok": False, "text": text})
+        elif command.kind in DRIVER_COMMANDS or command.kind == "stop":
+            self._backend.enqueue(number, command)
 
     def _broadcast(self, data: str | bytes) -> None:
-        if self._seat.driver is not None and self._seat.silence(time.monotonic()) > SEAT_TIMEOUT:
-            self._seat.leave(self._seat.driver)
+        driver = self._lock.driver
+        if driver is not None and self._lock.idle_time(time.monotonic()) > DRIVER_TIMEOUT:
+            self._lock.release(driver)
         keeping_up = [
             page.socket
             for page in self._pages.values()
-            if page.socket.transport.get_write_buffer_size() < SLOW
+            if page.socket.transport.get_write_buffer_size() < MAX_BACKLOG
         ]
         broadcast(keeping_up, data)
 
@@ -282,7 +287,9 @@ class ConsoleServer:
             broadcast([self._pages[number].socket], data)
 
 
-def _response(status: HTTPStatus, kind: str, content: bytes) -> Response:
-    headers = Headers({**HEADERS, "Content-Type": kind, "Content-Length": str(len(content))})
+def _response(status: HTTPStatus, content_type: str, content: bytes) -> Response:
+    headers = Headers(
+        {**HEADERS, "Content-Type": content_type, "Content-Length": str(len(content))}
+    )
     headers["Connection"] = "close"
     return Response(status.value, status.phrase, headers, content)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pages that are no browsers: they say what they are told to."""
+"""WebSocket clients that act as pages without a browser."""
 
 import json
 import socket
@@ -11,17 +11,23 @@ from typing import Any
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection, connect
 
+from noninteract_ros.console.protocol import VERSION
+
 DEADLINE = 20.0  # [s]
 
 
 class RawPage:
-    """A connection to a console.
+    """Connection to a console that sends arbitrary messages.
 
     Args:
-        port: Where the console listens.
-        token: What it says in its hello; None for no hello.
-        origin: Origin that it claims; by default the console's own, an empty text for none.
-        host: Host that it asks for; by default where it connects to.
+        port: Port of the console.
+        token: Token in the hello; None sends no hello.
+        origin: Origin header; by default the console's own, empty for none.
+        host: Host header; by default the address of the connection.
+
+    Attributes:
+        socket: The connection.
+        received: Received JSON messages.
     """
 
     def __init__(
@@ -29,7 +35,7 @@ class RawPage:
     ) -> None:
         own = f"http://127.0.0.1:{port}"
         uri = f"ws://{host or f'127.0.0.1:{port}'}/socket"
-        self._left = ExitStack()
+        self._cleanup = ExitStack()
         opening = connect(
             uri,
             sock=socket.create_connection(("127.0.0.1", port), DEADLINE),
@@ -37,46 +43,48 @@ class RawPage:
             compression=None,
             max_size=2**24,
         )
-        self.socket: ClientConnection = self._left.enter_context(opening)
-        self.told: list[dict[str, Any]] = []
+        self.socket: ClientConnection = self._cleanup.enter_context(opening)
+        self.received: list[dict[str, Any]] = []
         if token is not None:
-            with suppress(ConnectionClosed):  # It may be one page too many.
-                self.say("hello", version=1, token=token)
+            with suppress(ConnectionClosed):  # The console may be full.
+                self.send("hello", version=VERSION, token=token)
 
-    def say(self, kind: str, **values: Any) -> None:
-        """Sends a message."""
+    def send(self, kind: str, **values: Any) -> None:
+        """Send a message."""
         self.socket.send(json.dumps({"kind": kind, **values}))
 
     def until(self, done: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-        """Reads until a message is the one."""
+        """Receive until a JSON message meets a condition, and return it."""
         end = time.monotonic() + DEADLINE
         while time.monotonic() < end:
             data = self.socket.recv(timeout=DEADLINE)
             if isinstance(data, str):
-                self.told.append(json.loads(data))
-                if done(self.told[-1]):
-                    return self.told[-1]
-        raise AssertionError(f"not told within {DEADLINE} s; last: {self.told[-3:]}")
+                self.received.append(json.loads(data))
+                if done(self.received[-1]):
+                    return self.received[-1]
+        raise AssertionError(f"no such message within {DEADLINE} s; last: {self.received[-3:]}")
 
-    def welcomed(self) -> int:
-        """Waits to be let in; the page's number."""
-        return int(self.until(lambda told: told["kind"] == "you")["page"])
+    def wait_for_welcome(self) -> int:
+        """Wait until the console accepts the page; return its number."""
+        return int(self.until(lambda message: message["kind"] == "welcome")["page"])
 
-    def answer(self) -> tuple[bool, str]:
-        """The next answer."""
-        told = self.until(lambda told: told["kind"] == "answer")
-        return told["ok"], told["text"]
+    def response(self) -> tuple[bool, str]:
+        """Return success and text of the next response."""
+        message = self.until(lambda message: message["kind"] == "response")
+        return message["ok"], message["text"]
 
     def closed(self) -> tuple[int, str]:
-        """Reads until the console closes; code and reason."""
+        """Receive until the console closes the connection; return code and reason."""
         end = time.monotonic() + DEADLINE
         while time.monotonic() < end:
             try:
                 self.socket.recv(timeout=DEADLINE)
             except ConnectionClosed as error:
-                return (error.rcvd.code, error.rcvd.reason) if error.rcvd else (0, "no word")
+                return (
+                    (error.rcvd.code, error.rcvd.reason) if error.rcvd else (0, "no close frame")
+                )
         raise AssertionError(f"not closed within {DEADLINE} s")
 
     def close(self) -> None:
-        """Leaves."""
-        self._left.close()
+        """Close the connection."""
+        self._cleanup.close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A person at the console, in a real browser: everything that can be held, pressed and cut."""
+"""The console in a real browser: driving, stopping, authority, settings and failures."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+from browser_session import (
+    TOKEN,
+    BrowserSession,
+    CutRelay,
+    drag,
+    launch,
+    missing_browser,
+    press_pad,
+    suspended_pages,
+    take_screenshot,
+    wait,
+)
 from harness import Ros
 from pages import RawPage
 from programs import Programs
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
-from show import (
-    TOKEN,
-    Relay,
-    Show,
-    drag,
-    frozen,
-    launch,
-    missing,
-    press_pad,
-    shoot,
-    wait,
-)
 from std_msgs.msg import String
 from waiting import until
 from websockets.exceptions import ConnectionClosed
@@ -33,9 +33,9 @@ from websockets.exceptions import ConnectionClosed
 if TYPE_CHECKING:
     from playwright.sync_api import Page
 
-pytestmark = pytest.mark.skipif(bool(missing()), reason=missing())
-REST = 0.5  # [s] given to the team to come to rest
-PUSH = {
+pytestmark = pytest.mark.skipif(bool(missing_browser()), reason=missing_browser())
+MAX_STOPPING_TIME = 0.5  # [s]
+TWIST = {
     "subtask": "cooperative",
     "element": 0,
     "grab": 1,
@@ -45,76 +45,80 @@ PUSH = {
 
 
 @pytest.fixture(scope="module")
-def show(module_domain: int, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Show]:
-    """One team, one console and one browser for all tests; each opens pages of its own."""
+def session(
+    module_domain: int, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[BrowserSession]:
+    """Run one team, one console and one browser for all tests."""
     from playwright.sync_api import sync_playwright
 
-    with ExitStack() as left:
-        browser = launch(left.enter_context(sync_playwright()))
-        left.callback(browser.close)
+    with ExitStack() as cleanup:
+        browser = launch(cleanup.enter_context(sync_playwright()))
+        cleanup.callback(browser.close)
         ros = Ros(module_domain)
-        left.callback(ros.close)
-        programs = Programs(tmp_path_factory.mktemp("show"), module_domain)
-        left.callback(programs.close)
-        yield Show.open(ros, programs, browser)
+        cleanup.callback(ros.close)
+        programs = Programs(tmp_path_factory.mktemp("session"), module_domain)
+        cleanup.callback(programs.close)
+        yield BrowserSession.open(ros, programs, browser)
 
 
 @pytest.fixture(scope="module")
-def one_page(show: Show) -> Iterator[Page]:
-    """A page that stays open."""
-    with show.page(drives=False) as page:
+def shared_page(session: BrowserSession) -> Iterator[Page]:
+    """Open a page for all tests."""
+    with session.page(drives=False) as page:
         yield page
 
 
 @pytest.fixture
-def page(show: Show, one_page: Page) -> Iterator[Page]:
-    """The page that stays open, driving a team at rest, whatever the last test has left."""
-    one_page.bring_to_front()
-    if not one_page.evaluate("operatorConsole.drives()"):
-        one_page.click("#take")
-        wait(one_page, "operatorConsole.drives()")
-    if one_page.evaluate("operatorConsole.status().stopped"):
-        one_page.click("#resume")
-        wait(one_page, "!operatorConsole.status().stopped")
-    one_page.select_option("#what", "cooperative/0")
-    one_page.evaluate("document.activeElement.blur()")  # In a field, keys write.
-    show.rests()
-    yield one_page
-    one_page.mouse.up()
-    one_page.evaluate("window.pad = null")
+def page(session: BrowserSession, shared_page: Page) -> Iterator[Page]:
+    """Return the shared page, driving a team at rest, whatever the last test has left."""
+    shared_page.bring_to_front()
+    if not shared_page.evaluate("operatorConsole.drives()"):
+        shared_page.click("#control")
+        wait(shared_page, "operatorConsole.drives()")
+    if shared_page.evaluate("operatorConsole.status().stopped"):
+        shared_page.click("#resume")
+        wait(shared_page, "!operatorConsole.status().stopped")
+    shared_page.select_option("#driven", "cooperative/0")
+    shared_page.evaluate("document.activeElement.blur()")  # In a text field, keys do not drive.
+    session.wait_until_rest()
+    yield shared_page
+    shared_page.mouse.up()
+    shared_page.evaluate("window.pad = null")
 
 
-def test_the_page_asks_nobody_else(show: Show) -> None:
-    """Every request goes to the console, and nothing is refused by the page's own policy."""
-    asked: list[str] = []
-    complaints: list[str] = []
-    with show.page(drives=False) as page:
-        page.on("request", lambda request: asked.append(request.url))
-        page.on("console", lambda said: complaints.append(said.text))
-        page.on("pageerror", lambda error: complaints.append(str(error)))
+def test_the_page_requests_only_the_console(session: BrowserSession) -> None:
+    """Every request goes to the console, and nothing violates the page's content policy."""
+    urls: list[str] = []
+    errors: list[str] = []
+    with session.page(drives=False) as page:
+        page.on("request", lambda request: urls.append(request.url))
+        page.on("console", lambda message: errors.append(message.text))
+        page.on("pageerror", lambda error: errors.append(str(error)))
         page.reload()
-        wait(page, "operatorConsole.status()?.there")
-        shoot(page, "watching")
-    own = (f"http://127.0.0.1:{show.port}/", "data:,")
-    assert asked
-    assert all(url.startswith(own) for url in asked), asked
-    assert [text for text in complaints if "GL Driver" not in text] == []
+        wait(page, "operatorConsole.status()?.live")
+        take_screenshot(page, "watching")
+    own = (f"http://127.0.0.1:{session.port}/", "data:,")
+    assert urls
+    assert all(url.startswith(own) for url in urls), urls
+    assert [text for text in errors if "GL Driver" not in text] == []
 
 
-def test_a_drag_of_the_handle_moves_the_team_by_that_much(show: Show, page: Page) -> None:
-    """The team's middle is where the mouse has pulled it to, on the screen and in the world."""
-    start = show.centre()
+def test_the_team_follows_a_drag_of_the_handle(session: BrowserSession, page: Page) -> None:
+    """The centre of the team moves by the drag of the mouse, in the window and in the world."""
+    start = session.centre()
     before = page.evaluate(f"operatorConsole.pixel({[*start.tolist(), 0.0]})")
     drag(page, "x", (60.0, 0.0))
-    pulled = page.evaluate("operatorConsole.handle()")
-    until(lambda: np.abs(show.centre() - pulled[:2]).max() < 1e-3, "the team follows the handle")
-    shoot(page, "drag")
+    dragged = page.evaluate("operatorConsole.handle()")
+    until(
+        lambda: np.abs(session.centre() - dragged[:2]).max() < 1e-3, "the team follows the handle"
+    )
+    take_screenshot(page, "drag")
     page.mouse.up()
-    show.rests()
-    moved = show.centre() - start
+    session.wait_until_rest()
+    moved = session.centre() - start
     assert moved[0] > 0.1
     assert abs(moved[1]) < 1e-3
-    after = page.evaluate(f"operatorConsole.pixel({[*show.centre().tolist(), 0.0]})")
+    after = page.evaluate(f"operatorConsole.pixel({[*session.centre().tolist(), 0.0]})")
     np.testing.assert_allclose(np.subtract(after, before), [60.0, 0.0], atol=2.0)
 
 
@@ -140,86 +144,87 @@ def by_gamepad(page: Page) -> Callable[[], None]:
 
 
 @pytest.mark.parametrize("hold", [by_pad, by_keys, by_gamepad])
-def test_what_is_held_leads_until_it_is_let_go(
-    show: Show, page: Page, hold: Callable[[Page], Callable[[], None]]
+def test_a_held_input_drives_until_it_is_released(
+    session: BrowserSession, page: Page, hold: Callable[[Page], Callable[[], None]]
 ) -> None:
-    """Towards -y at the console's speed, and at rest soon after the release."""
-    start = show.centre()
+    """The team moves along -y at the console's speed and is at rest soon after the release."""
+    start = session.centre()
     release = hold(page)
-    show.moves(0.19)
-    shoot(page, hold.__name__)
-    assert show.rest_after(release) < REST
-    moved = show.centre() - start
-    assert moved[1] < -0.02  # What it takes to come to that speed and to rest.
+    session.wait_until_moving(0.19)
+    take_screenshot(page, hold.__name__)
+    assert session.stopping_time(release) < MAX_STOPPING_TIME
+    moved = session.centre() - start
+    assert moved[1] < -0.02  # The least distance to reach that speed and stop.
     assert abs(moved[0]) < 1e-3
-    assert show.stays()
+    assert session.stays_at_rest()
 
 
-def test_a_stick_without_its_button_does_nothing(show: Show, page: Page) -> None:
-    """A gamepad's button is the dead-man's switch."""
+def test_a_gamepad_drives_only_with_its_enable_button(session: BrowserSession, page: Page) -> None:
+    """The shoulder button is the dead-man's switch."""
     tilt_stick(page, False)
-    assert show.stays()
+    assert session.stays_at_rest()
 
 
-def freeze(show: Show, left: ExitStack) -> tuple[Page, Callable[[], None]]:
-    page = left.enter_context(show.page())
-    return page, lambda: left.enter_context(frozen(show.browser))
+def suspend_page(session: BrowserSession, cleanup: ExitStack) -> tuple[Page, Callable[[], None]]:
+    page = cleanup.enter_context(session.page())
+    return page, lambda: cleanup.enter_context(suspended_pages(session.browser))
 
 
-def close(show: Show, left: ExitStack) -> tuple[Page, Callable[[], None]]:
-    page = left.enter_context(show.page())
+def close_page(session: BrowserSession, cleanup: ExitStack) -> tuple[Page, Callable[[], None]]:
+    page = cleanup.enter_context(session.page())
     return page, page.close
 
 
-def cut(show: Show, left: ExitStack) -> tuple[Page, Callable[[], None]]:
-    relay = Relay(show.port)
-    left.callback(relay.close)
-    return left.enter_context(show.page(port=relay.port)), relay.cut
+def cut_connection(session: BrowserSession, cleanup: ExitStack) -> tuple[Page, Callable[[], None]]:
+    relay = CutRelay(session.port)
+    cleanup.callback(relay.close)
+    return cleanup.enter_context(session.page(port=relay.port)), relay.cut
 
 
-@pytest.mark.parametrize("lose", [freeze, close, cut])
-def test_a_page_that_is_lost_lets_go(
-    show: Show, lose: Callable[[Show, ExitStack], tuple[Page, Callable[[], None]]]
+@pytest.mark.parametrize("lose", [suspend_page, close_page, cut_connection])
+def test_a_lost_page_releases_its_input(
+    session: BrowserSession,
+    lose: Callable[[BrowserSession, ExitStack], tuple[Page, Callable[[], None]]],
 ) -> None:
-    """Frozen, closed or cut off while it drives: the team is at rest within half a second."""
-    with ExitStack() as left:
-        page, end = lose(show, left)
+    """The team is at rest within half a second after its page is suspended, closed or cut off."""
+    with ExitStack() as cleanup:
+        page, trigger = lose(session, cleanup)
         press_pad(page, 0.0, 0.4)
-        show.moves(0.19, page)
-        assert show.rest_after(end) < REST
-        assert show.stays()
+        session.wait_until_moving(0.19, page)
+        assert session.stopping_time(trigger) < MAX_STOPPING_TIME
+        assert session.stays_at_rest()
 
 
-def test_the_space_key_stops_and_the_stop_is_latched(show: Show, page: Page) -> None:
-    """While a pad is held, and with the cursor in a field; only a resume lets anything move."""
+def test_the_space_key_latches_a_stop(session: BrowserSession, page: Page) -> None:
+    """It stops while a pad is held and a text field has the focus; only a resume ends it."""
     press_pad(page, 0.0, 0.4)
-    show.moves()
+    session.wait_until_moving()
     page.locator("input[data-gain]").first.focus()
-    assert show.rest_after(lambda: page.keyboard.press("Space")) < REST
+    assert session.stopping_time(lambda: page.keyboard.press("Space")) < MAX_STOPPING_TIME
     wait(page, "operatorConsole.status().stopped")
     page.mouse.move(400, 300)
-    shoot(page, "stopped")
+    take_screenshot(page, "stopped")
     page.mouse.up()
     press_pad(page, 0.0, 0.4)
-    assert show.stays()
+    assert session.stays_at_rest()
     page.mouse.up()
     page.click("#resume")
     wait(page, "!operatorConsole.status().stopped")
     release = by_keys(page)
-    show.moves()
+    session.wait_until_moving()
     release()
 
 
-def test_anybody_stops_by_the_button(show: Show, page: Page) -> None:
-    """A page that only watches stops the team, and cannot resume it."""
-    with show.page(drives=False, size=(390, 844)) as watcher:
+def test_every_page_can_stop(session: BrowserSession, page: Page) -> None:
+    """A page that does not drive stops the team, but cannot resume it."""
+    with session.page(drives=False, size=(390, 844)) as observer:
         page.bring_to_front()
         page.keyboard.down("KeyW")
-        show.moves()
-        watcher.click("#stop")
-        show.rests()
-        wait(watcher, "operatorConsole.status().stopped")
-        assert watcher.is_disabled("#resume")
+        session.wait_until_moving()
+        observer.click("#stop")
+        session.wait_until_rest()
+        wait(observer, "operatorConsole.status().stopped")
+        assert observer.is_disabled("#resume")
         page.keyboard.up("KeyW")
         page.click("#resume")
         wait(page, "!operatorConsole.status().stopped")
@@ -230,74 +235,76 @@ def hand_over(page: Page, subtask: str, source: str) -> None:
     wait(page, f"operatorConsole.status().subtasks.{subtask}.authority === '{source}'")
 
 
-def test_a_subtask_is_handed_over_in_mid_motion(show: Show, page: Page) -> None:
-    """What the human leads no more comes to rest, though the key is held; and back again."""
+def test_a_hand_over_in_motion_stops_the_subtask(session: BrowserSession, page: Page) -> None:
+    """Without human authority a held key has no effect; with it the subtask moves again."""
     page.keyboard.down("ArrowDown")
-    show.moves()
+    session.wait_until_moving()
     hand_over(page, "cooperative", "hold")
-    show.rests()
-    assert page.inner_text("#hint") == ("cooperative is led by hold: hand it over to human first")
-    assert show.stays()
-    shoot(page, "handed_over")
+    session.wait_until_rest()
+    assert page.inner_text("#hint") == "cooperative: authority is hold; set it to human first"
+    assert session.stays_at_rest()
+    take_screenshot(page, "handed_over")
     hand_over(page, "cooperative", "human")
-    show.moves()
+    session.wait_until_moving()
     page.keyboard.up("ArrowDown")
-    show.rests()
+    session.wait_until_rest()
 
 
-def test_errors_energies_and_the_tank_are_plotted(show: Show, page: Page) -> None:
-    """A plot each, with numbers of this team, and the tank where the law has one."""
+def test_errors_energies_and_tank_are_plotted(session: BrowserSession, page: Page) -> None:
+    """Each has a plot; the tank has one under a law with a tank."""
     law = page.input_value("#law")
     page.select_option("#law", "energy_gated")
     titles = ["Tracking error [m]", "Storage [J]", "Power supplied [W]", "Tank [J] and σ"]
     drawn = "[...document.querySelectorAll('#plots h3')].map((title) => title.textContent)"
     wait(page, f"{titles}.every((title) => {drawn}.includes(title))")
     page.locator("#plots").scroll_into_view_if_needed()
-    shoot(page, "plots")
+    take_screenshot(page, "plots")
     page.select_option("#law", law)
     wait(page, f"operatorConsole.status().law === '{law}'")
 
 
-def leads(page: Page, source: str) -> None:
-    """Waits until the page's buttons show that a source leads the relative subtask."""
+def wait_for_authority(page: Page, source: str) -> None:
+    """Wait until the page shows the authority of the relative subtask."""
     button = f"button[data-subtask=relative][data-source={source}]"
     pressed = f"document.querySelector('{button}').getAttribute('aria-pressed') === 'true'"
     wait(page, pressed)
 
 
-def test_every_page_shows_who_leads_however_it_came_about(show: Show, page: Page) -> None:
-    """By topic and by parameter, from outside; the page's own buttons are pressed by it."""
-    leads(page, "autonomy")
-    talker = show.ros.probe.create_publisher(String, "relative/authority", 10)
-    show.ros.matched(talker)
-    talker.publish(String(data="human"))
-    leads(page, "human")
-    wanted = Parameter("relative.authority", value="autonomy").to_parameter_msg()
-    request = SetParametersAtomically.Request(parameters=[wanted])
+def test_the_page_shows_an_authority_set_elsewhere(session: BrowserSession, page: Page) -> None:
+    """The buttons follow hand-overs by topic and by parameter."""
+    wait_for_authority(page, "autonomy")
+    publisher = session.ros.probe.create_publisher(String, "relative/authority", 10)
+    session.ros.matched(publisher)
+    publisher.publish(String(data="human"))
+    wait_for_authority(page, "human")
+    parameter = Parameter("relative.authority", value="autonomy").to_parameter_msg()
+    request = SetParametersAtomically.Request(parameters=[parameter])
     service = "controller/set_parameters_atomically"
-    assert show.ros.call(SetParametersAtomically, service, request).result.successful
-    leads(page, "autonomy")
-    show.ros.probe.destroy_publisher(talker)
+    assert session.ros.call(SetParametersAtomically, service, request).result.successful
+    wait_for_authority(page, "autonomy")
+    session.ros.probe.destroy_publisher(publisher)
 
 
-def test_the_human_takes_the_relative_subtask(show: Show, page: Page) -> None:
-    """Handed over by the page, its handle squeezes the team, whose middle stays."""
+def test_the_relative_subtask_is_driven_after_a_hand_over(
+    session: BrowserSession, page: Page
+) -> None:
+    """Driving it changes the distance of the robots and not the centre of the team."""
     hand_over(page, "relative", "human")
-    page.select_option("#what", "relative/0")
-    start, before = show.centre(), show.ear.newest().position.copy()
+    page.select_option("#driven", "relative/0")
+    start, before = session.centre(), session.ear.newest().position.copy()
     page.keyboard.down("ArrowLeft")
-    show.moves(0.1)
+    session.wait_until_moving(0.1)
     page.keyboard.up("ArrowLeft")
-    show.rests()
-    now = show.ear.newest().position
+    session.wait_until_rest()
+    now = session.ear.newest().position
     assert (before - now)[0] - (before - now)[2] > 0.02
-    assert np.abs(show.centre() - start).max() < 1e-3
+    assert np.abs(session.centre() - start).max() < 1e-3
     hand_over(page, "relative", "autonomy")
-    show.rests()
+    session.wait_until_rest()
 
 
-def test_law_and_gains_are_changed(show: Show, page: Page) -> None:
-    """The controller says that it has them; what does not fit is refused in words."""
+def test_law_and_gains_are_changed(session: BrowserSession, page: Page) -> None:
+    """The page shows the controller's values; an invalid value shows the reason."""
     page.select_option("#law", "natural")
     wait(page, "operatorConsole.status().law === 'natural'")
     gain = page.locator("input[data-gain='relative.stiffness']")
@@ -307,62 +314,62 @@ def test_law_and_gains_are_changed(show: Show, page: Page) -> None:
     gain.fill("1, 2, 3")
     gain.press("Enter")
     wait(page, "document.querySelector('#answers .bad')?.textContent.includes('stiffness')")
-    shoot(page, "refused_gains")
+    take_screenshot(page, "rejected_gains")
     page.select_option("#law", "noninteracting")
     wait(page, "operatorConsole.status().law === 'noninteracting'")
-    assert show.stays()
+    assert session.stays_at_rest()
 
 
-def test_the_simulation_is_paused_stepped_and_reset(show: Show, page: Page) -> None:
-    """Paused, its time stands; a step is one tick; a reset puts the team where it began."""
+def test_the_simulation_is_paused_stepped_and_reset(session: BrowserSession, page: Page) -> None:
+    """A pause holds the time, a step is one tick, and a reset restores the initial state."""
     release = by_keys(page)
-    show.moves()
+    session.wait_until_moving()
     release()
     page.click("#pause")
     wait(page, "operatorConsole.status().paused")
-    words = "document.querySelector('#programs').textContent"
-    wait(page, f"{words}.includes('waiting: the team is paused')")
-    standing = show.ear.now
+    programs = "document.querySelector('#programs').textContent"
+    wait(page, f"{programs}.includes('waiting: the team is paused')")
+    paused_at = session.ear.now
     page.click("#step")
-    until(lambda: show.ear.now > standing, "a step")
-    assert show.ear.now == pytest.approx(standing + 1.0 / 200.0, abs=1e-6)
+    until(lambda: session.ear.now > paused_at, "a step of the team")
+    assert session.ear.now == pytest.approx(paused_at + 1.0 / 200.0, abs=1e-6)
     page.click("#pause")
     wait(page, "!operatorConsole.status().paused")
     page.click("#reset")
-    until(lambda: np.abs(show.centre()).max() < 1e-4, "the team is where it began")
-    show.rests()
-    assert np.abs(show.centre()).max() < 1e-3
+    until(lambda: np.abs(session.centre()).max() < 1e-4, "the initial state")
+    session.wait_until_rest()
+    assert np.abs(session.centre()).max() < 1e-3
 
 
-def test_one_drives_and_the_other_watches(show: Show, page: Page) -> None:
-    """The second page's pad does nothing until it takes over; then the first one's does."""
-    with show.page(drives=False) as second:
-        assert second.inner_text("#hint") == "somebody else drives"
+def test_only_one_page_drives(session: BrowserSession, page: Page) -> None:
+    """The second page's pad has no effect until it takes over; then the first one's has none."""
+    with session.page(drives=False) as second:
+        assert second.inner_text("#hint") == "another page drives"
         press_pad(second, 0.0, 0.4)
-        assert show.stays()
+        assert session.stays_at_rest()
         second.mouse.up()
-        assert second.inner_text("#take") == "Take over"
-        second.click("#take")
+        assert second.inner_text("#control") == "Take over"
+        second.click("#control")
         wait(second, "operatorConsole.drives()")
         wait(page, "!operatorConsole.drives()")
-        shoot(page, "taken_over")
+        take_screenshot(page, "taken_over")
         press_pad(page, 0.0, 0.4)
-        assert show.stays()
+        assert session.stays_at_rest()
         page.mouse.up()
         press_pad(second, 0.0, 0.4)
-        show.moves(pressed=second)
+        session.wait_until_moving(pressed=second)
         second.mouse.up()
-        show.rests()
+        session.wait_until_rest()
 
 
-def refused(show: Show) -> Iterator[tuple[str, Callable[[], Any]]]:
-    """Everything that must be refused, each by a name."""
+def attacks(session: BrowserSession) -> Iterator[tuple[str, Callable[[], Any]]]:
+    """Yield name and function of everything that must be rejected."""
 
     def driving(send: Callable[[RawPage], None], code: int) -> Callable[[], None]:
         def attack() -> None:
-            page = RawPage(show.port, TOKEN)
-            page.welcomed()
-            page.say("take")
+            page = RawPage(session.port, TOKEN)
+            page.wait_for_welcome()
+            page.send("take_control")
             send(page)
             assert page.closed()[0] == code
 
@@ -370,40 +377,40 @@ def refused(show: Show) -> Iterator[tuple[str, Callable[[], Any]]]:
 
     def foreign() -> None:
         with pytest.raises(Exception, match="403"):
-            RawPage(show.port, TOKEN, origin="http://evil.example")
+            RawPage(session.port, TOKEN, origin="http://evil.example")
 
     def without_token() -> None:
-        page = RawPage(show.port, "")
+        page = RawPage(session.port, "")
         assert page.closed() == (1008, "wrong token")
 
     def flood(page: RawPage) -> None:
         with suppress(ConnectionClosed):
             for _ in range(400):
-                page.say("release")
+                page.send("release")
 
     yield "foreign origin", foreign
     yield "missing token", without_token
-    yield "oversized", driving(lambda page: page.say("push", **PUSH, more="x" * 5000), 1009)
-    yield "malformed", driving(lambda page: page.say("push", **PUSH, more=1), 1008)
-    yield "no numbers", driving(lambda page: page.say("push", **PUSH | {"linear": "x"}), 1008)
+    yield "oversized", driving(lambda page: page.send("twist", **TWIST, more="x" * 5000), 1009)
+    yield "malformed", driving(lambda page: page.send("twist", **TWIST, more=1), 1008)
+    yield "wrong type", driving(lambda page: page.send("twist", **TWIST | {"linear": "x"}), 1008)
     yield "too frequent", driving(flood, 1008)
 
 
-def test_nothing_moves_by_what_is_refused(show: Show) -> None:
-    """Foreign origins, missing tokens, messages too large, malformed or too many: no effect."""
-    show.rests()
-    began = show.ear.now
-    for name, attack in refused(show):
+def test_rejected_messages_move_nothing(session: BrowserSession) -> None:
+    """Foreign origins, wrong tokens and invalid or too many messages have no effect."""
+    session.wait_until_rest()
+    start = session.ear.now
+    for name, attack in attacks(session):
         attack()
-        assert show.stays(0.05), name
-    assert show.ear.now > began
+        assert session.stays_at_rest(0.05), name
+    assert session.ear.now > start
 
 
-def test_it_works_on_a_phone(show: Show) -> None:
-    """390 x 844: no scrolling sideways, the stop and the pad at hand, and the pad leads."""
-    with show.page(size=(390, 844)) as page:
+def test_the_page_fits_a_phone(session: BrowserSession) -> None:
+    """At 390 x 844 nothing scrolls sideways, stop and pad stay visible, and the pad drives."""
+    with session.page(size=(390, 844)) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
-        shoot(page, "phone")
+        take_screenshot(page, "phone")
         page.mouse.wheel(0, 3000)
         wait(page, "scrollY > 100")
         for name in ("#stop", "#pad-plane"):
@@ -413,8 +420,8 @@ def test_it_works_on_a_phone(show: Show) -> None:
             assert box["x"] + box["width"] <= 390.0
             assert box["y"] >= 0.0
             assert box["y"] + box["height"] <= 844.0
-        shoot(page, "phone_scrolled")
+        take_screenshot(page, "phone_scrolled")
         press_pad(page, 0.4, 0.0)
-        show.moves(pressed=page)
+        session.wait_until_moving(pressed=page)
         page.mouse.up()
-        show.rests()
+        session.wait_until_rest()

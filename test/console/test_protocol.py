@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What pages may say, and what they may not."""
+"""Validation of messages from pages."""
 
 import json
 from typing import Any
@@ -7,15 +7,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from noninteract_ros.console.page_input import PageDrag, PagePush
-from noninteract_ros.console.protocol import KINDS, held, parse
+from noninteract_ros.console.held_input import PageDrag, PageTwist
+from noninteract_ros.console.protocol import KINDS, held_input, parse
 from noninteract_ros.errors import InputError
 
-NO_TURN = [0.0, 0.0, 0.0, 1.0]
+IDENTITY_ROTATION = [0.0, 0.0, 0.0, 1.0]
 GOOD: dict[str, dict[str, Any]] = {
-    "hello": {"version": 1, "token": "abc"},
-    "drag": {"subtask": "a", "element": 0, "grab": 1, "by": [0.1, 0, -2], "turn": NO_TURN},
-    "push": {
+    "hello": {"version": 2, "token": "abc"},
+    "drag": {
+        "subtask": "a",
+        "element": 0,
+        "grab": 1,
+        "translation": [0.1, 0, -2],
+        "rotation": IDENTITY_ROTATION,
+    },
+    "twist": {
         "subtask": "a",
         "element": 0,
         "grab": 1,
@@ -34,14 +40,14 @@ BAD: list[tuple[str, dict[str, Any]]] = [
     ("drag", {"element": -1}),
     ("drag", {"element": True}),
     ("drag", {"grab": 1.5}),
-    ("drag", {"by": [0.0, 0.0]}),
-    ("drag", {"by": [0.0, 0.0, "0"]}),
-    ("drag", {"by": [0.0, 0.0, True]}),
-    ("drag", {"by": [0.0, 0.0, 1e9]}),
-    ("drag", {"turn": [0.0, 0.0, 0.0, 0.0]}),
-    ("drag", {"turn": [0.0, 0.0, 1.0, 1.0]}),
-    ("push", {"linear": [1.5, 0.0, 0.0]}),
-    ("push", {"angular": None}),
+    ("drag", {"translation": [0.0, 0.0]}),
+    ("drag", {"translation": [0.0, 0.0, "0"]}),
+    ("drag", {"translation": [0.0, 0.0, True]}),
+    ("drag", {"translation": [0.0, 0.0, 1e9]}),
+    ("drag", {"rotation": [0.0, 0.0, 0.0, 0.0]}),
+    ("drag", {"rotation": [0.0, 0.0, 1.0, 1.0]}),
+    ("twist", {"linear": [1.5, 0.0, 0.0]}),
+    ("twist", {"angular": None}),
     ("authority", {"source": "nobody"}),
     ("authority", {"source": ["human"]}),
     ("gains", {"name": "inertia"}),
@@ -57,29 +63,29 @@ def text(kind: str, **changes: Any) -> str:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_kind_is_taken_as_it_is_meant(kind: str) -> None:
-    """A message of the right form comes out as it went in."""
-    said = parse(text(kind))
-    assert said.kind == kind
-    assert dict(said.values) == GOOD.get(kind, {})
+def test_every_kind_is_parsed(kind: str) -> None:
+    """Kind and values of a valid message are returned unchanged."""
+    command = parse(text(kind))
+    assert command.kind == kind
+    assert dict(command.values) == GOOD.get(kind, {})
 
 
 @pytest.mark.parametrize(("kind", "changes"), BAD)
-def test_a_wrong_value_is_refused(kind: str, changes: dict[str, Any]) -> None:
-    """One wrong value makes the whole message wrong."""
-    with pytest.raises(InputError, match=f"{kind} with a wrong"):
+def test_an_invalid_value_is_rejected(kind: str, changes: dict[str, Any]) -> None:
+    """One invalid value rejects the whole message."""
+    with pytest.raises(InputError, match=f"{kind}: invalid"):
         parse(text(kind, **changes))
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_another_set_of_keys_is_refused(kind: str) -> None:
-    """A key too many is refused, and so is one too few."""
-    with pytest.raises(InputError, match="other keys"):
+def test_missing_and_unknown_keys_are_rejected(kind: str) -> None:
+    """The keys have to be exactly those of the kind."""
+    with pytest.raises(InputError, match="missing or unknown keys"):
         parse(text(kind, more=1))
     for name in GOOD.get(kind, {}):
         content = json.loads(text(kind))
         del content[name]
-        with pytest.raises(InputError, match="other keys"):
+        with pytest.raises(InputError, match="missing or unknown keys"):
             parse(json.dumps(content))
 
 
@@ -88,29 +94,29 @@ def test_another_set_of_keys_is_refused(kind: str) -> None:
     [
         b"{}",
         "",
-        "beat",
+        "heartbeat",
         "[]",
         "null",
-        '{"kind": "beat"',
+        '{"kind": "heartbeat"',
         '{"kind": "fly"}',
-        '{"kind": ["beat"]}',
+        '{"kind": ["heartbeat"]}',
         "[" * 4000,
-        text("push").replace("0.5", "NaN"),
-        text("push").replace("0.5", "Infinity"),
-        text("push").replace("0.5", "1e999"),
+        text("twist").replace("0.5", "NaN"),
+        text("twist").replace("0.5", "Infinity"),
+        text("twist").replace("0.5", "1e999"),
     ],
 )
-def test_what_is_no_message_is_refused(data: str | bytes) -> None:
-    """No JSON, another kind of JSON, numbers that are none: refused, whatever it is."""
+def test_other_data_is_rejected(data: str | bytes) -> None:
+    """Invalid JSON, other JSON types, unknown kinds and non-finite numbers are rejected."""
     with pytest.raises(InputError):
         parse(data)
 
 
-def test_what_is_held_comes_out_as_arrays() -> None:
-    """Drags and pushes are things to hold; other messages are not."""
-    drag, push = held(parse(text("drag"))), held(parse(text("push")))
+def test_held_inputs_are_converted_to_arrays() -> None:
+    """Drags and twists are held inputs; other messages are not."""
+    drag, twist = held_input(parse(text("drag"))), held_input(parse(text("twist")))
     assert isinstance(drag, PageDrag)
-    assert isinstance(push, PagePush)
-    np.testing.assert_array_equal(drag.by, [0.1, 0.0, -2.0])
-    np.testing.assert_array_equal(push.linear, [1.0, -1.0, 0.5])
-    assert held(parse(text("release"))) is None
+    assert isinstance(twist, PageTwist)
+    np.testing.assert_array_equal(drag.translation, [0.1, 0.0, -2.0])
+    np.testing.assert_array_equal(twist.linear, [1.0, -1.0, 0.5])
+    assert held_input(parse(text("release"))) is None

@@ -84,7 +84,7 @@ def page(ros: Ros, scenario: dict[str, Any]) -> Iterator[RawPage]:
     console = ros.node(OperatorConsole(context=ros.context, parameter_overrides=overrides))
     found = RawPage(int(console.url.rpartition(":")[2].rstrip("/")))
     try:
-        found.welcomed()
+        found.wait_for_welcome()
         yield found
     finally:
         found.close()

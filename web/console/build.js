@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Builds the page into the folder given, by default the package's own.
+// Build the page into the given folder, by default the package's static folder.
 
 import { build } from "esbuild";
 import { copyFile, mkdir, readFile, writeFile } from "node:fs/promises";
@@ -19,7 +19,7 @@ await build({
   format: "esm",
   target: "es2022",
   charset: "utf8",
-  legalComments: "none", // LICENSES.txt has them whole.
+  legalComments: "none", // LICENSES.txt contains the full texts.
   banner: { js: "/* SPDX-License-Identifier: Apache-2.0 AND MIT; see LICENSES.txt */" },
 });
 for (const name of ["index.html", "style.css"]) {

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The program `operator_console`."""
+"""Node `operator_console`: ROS interface of the operator console."""

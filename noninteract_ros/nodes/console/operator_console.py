@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program `operator_console`: a page in the browser to see a team, to lead it and to stop it."""
+"""Node `operator_console`: browser page to monitor, drive and stop a team."""
 
 import json
 import os
@@ -15,34 +15,35 @@ from rclpy.node import Node
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.clock import seconds
+from noninteract_ros.console.console_scene import ConsoleScene
 from noninteract_ros.console.drive import Drive, DriveState
 from noninteract_ros.console.driver_lock import DriverLock
-from noninteract_ros.console.frames import picture
-from noninteract_ros.console.handles import drivables
-from noninteract_ros.console.page_input import Held, PageDeadMan
+from noninteract_ros.console.frames import encode_poses
+from noninteract_ros.console.handles import drivable_subtasks
+from noninteract_ros.console.held_input import DeadMansSwitch, HeldInput
 from noninteract_ros.console.protocol import PageCommand
-from noninteract_ros.console.stage import Stage
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, Ticker
 from noninteract_ros.nodes.common.program import run_program
-from noninteract_ros.nodes.console.calls import Calls
+from noninteract_ros.nodes.console.service_clients import ServiceClients
 from noninteract_ros.nodes.console.status import StackStatus
 from noninteract_ros.nodes.console.subscriptions import ConsoleSubscriptions
 from noninteract_ros.nodes.messages.messages import Level, SubtaskCodec
 from noninteract_ros.scenario.console_settings import ConsoleSettings
 
 TOKEN_VARIABLE = "NONINTERACT_CONSOLE_TOKEN"
-LONGEST_STEP = 0.05  # [s] of a reference, after a gap in the team's states
+MAX_STEP = 0.05  # [s] of a reference after a gap in the team's states
 SAMPLE_PERIOD = 0.05  # [s] of plots
 STATUS_PERIOD = 0.2  # [s]
-READ_PERIOD = 1.0  # [s] of parameters
-STALE = 0.3  # [s] age of the team's state from which nobody can drive
+PARAMETER_PERIOD = 1.0  # [s] of reading parameters
+STALE = 0.3  # [s] age of the team's state from which driving is disabled
 
 
 class OperatorConsole(ScenarioNode):
-    """Serves the page; hears the team; speaks for the human while somebody holds something.
+    """Web server of the page, and publisher of the references that its driver asks for.
 
-    The server has a thread of its own. What pages ask for comes out of a queue, what they hold
-    out of the dead-man's switch; the main thread reads both, so that a server that hangs lets go.
+    The server runs in its own thread. Commands of pages pass through a queue, held inputs through
+    the dead-man's switch. The main thread reads both, so that inputs are released even if the
+    server hangs.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -50,26 +51,28 @@ class OperatorConsole(ScenarioNode):
         self.settings = self.scenario.console or ConsoleSettings()
         team = self.scenario.build_team()
         stack = self.scenario.build_stack(team)
-        self._stage = Stage(self.scenario, team, stack)
-        # Lockstep waits for its sources; a person is none of those that can be waited for.
-        awaited = self.scenario.general.lockstep_sources if self.lockstep else ()
-        self._awaited = [name for name in stack.names if f"{name}/human" in awaited]
-        found = drivables(self.scenario, stack)
-        self._drivables = {name: found[name] for name in found if name not in self._awaited}
-        # A node without an executor: what it hears is taken by hand, when it is wanted.
-        self._listener = Node(
-            "operator_console_ear", namespace=self.get_namespace(), context=self.context
+        self._scene = ConsoleScene(self.scenario, team, stack)
+        # Lockstep waits for references of its sources at each tick, which an operator cannot give.
+        sources = self.scenario.general.lockstep_sources if self.lockstep else ()
+        self._awaited = [name for name in stack.names if f"{name}/human" in sources]
+        found = drivable_subtasks(self.scenario, stack)
+        self._drivable = {name: found[name] for name in found if name not in self._awaited}
+        # A node without an executor: its messages are taken only when they are needed.
+        self._subscriber = Node(
+            "operator_console_subscriber", namespace=self.get_namespace(), context=self.context
         )
-        self._ear = ConsoleSubscriptions(self._listener, team, stack, self._stage.body_names)
-        self._calls = Calls(self, stack.names)
-        self._asked: queue.SimpleQueue[tuple[int, PageCommand]] = queue.SimpleQueue()
-        self._switch = PageDeadMan(self.settings.hold_timeout)
-        self._seat = DriverLock(self._switch)
-        self._drive = Drive(self._drivables)
+        self._team_state = ConsoleSubscriptions(
+            self._subscriber, team, stack, self._scene.body_names
+        )
+        self._clients = ServiceClients(self, stack.names)
+        self._commands: queue.SimpleQueue[tuple[int, PageCommand]] = queue.SimpleQueue()
+        self._switch = DeadMansSwitch(self.settings.hold_timeout)
+        self._lock = DriverLock(self._switch)
+        self._drive = Drive(self._drivable)
         self._status = StackStatus(stack)
         self._state_at = -1e9
-        self._led_at = -1  # Stamp of the state up to which references have been made [ns].
-        self._told_at = self._sampled_at = 0.0
+        self._reference_stamp = -1  # Stamp of the state of the last references [ns].
+        self._status_at = self._sample_at = 0.0
         self._sent = 0
         self._references = {
             task.name: (
@@ -79,186 +82,194 @@ class OperatorConsole(ScenarioNode):
                 ),
             )
             for task in stack.subtasks
-            if task.name in self._drivables
+            if task.name in self._drivable
         }
-        self.subscribe(DiagnosticArray, "/diagnostics", self._status.note)
+        self.subscribe(DiagnosticArray, "/diagnostics", self._status.update)
         self._token = os.environ.get(TOKEN_VARIABLE, "")
         if not self._token and not self.settings.is_local:
             self._token = secrets.token_urlsafe(18)
-        # Here, so that a wrong parameter file is refused before all else is loaded.
+        # Imported here, so that a wrong parameter file is rejected without loading the server.
         from noninteract_ros.console.server import ConsoleServer
 
-        self._server = ConsoleServer(self.settings, self._token, self._seat, self)
+        self._server = ConsoleServer(self.settings, self._token, self._lock, self)
         self._server.start()
 
     @property
     def url(self) -> str:
-        """Where the page is; the part after # is not sent to anybody."""
+        """Address of the page; browsers do not send the part after #."""
         host = self.settings.host if self.settings.is_local else "<this machine>"
         host = f"[{host}]" if ":" in host else host
         secret = f"#token={self._token}" if self._token else ""
         return f"http://{host}:{self._server.port}/{secret}"
 
     def greeting(self) -> list[str | bytes]:
-        """What a page is told first; called in the server's thread."""
-        told = {
-            "drivable": list(self._drivables),
+        """Return the messages that open a connection; called in the server's thread."""
+        extra = {
+            "drivable": list(self._drivable),
             "awaited": self._awaited,
             "namespace": self.get_namespace(),
         }
-        return self._stage.greeting(told)
+        return self._scene.greeting(extra)
 
-    def knows(self, item: Held) -> bool:
-        """Whether there is such a subtask, with such an element."""
-        found = self._drivables.get(item.subtask)
-        return found is not None and item.element < found.elements
+    def accepts(self, held: HeldInput) -> bool:
+        """Return True if the subtask is drivable and has the element."""
+        found = self._drivable.get(held.subtask)
+        return found is not None and held.element < found.elements
 
-    def command(self, page: int, said: PageCommand) -> None:
-        """Keeps what a page asks for; called in the server's thread."""
-        self._asked.put((page, said))
+    def enqueue(self, page: int, command: PageCommand) -> None:
+        """Queue a command of a page; called in the server's thread."""
+        self._commands.put((page, command))
 
     @property
     def has_loop(self) -> bool:
-        """In lockstep too: people have a time of their own."""
+        """True, in lockstep too: pages are served in wall time."""
         return True
 
     def run(self) -> None:
-        """Runs until the context is shut down."""
-        # Not by the logger, whose topic anybody can hear: the address may hold the token.
+        """Run until the context is shut down."""
+        # Not through the logger, whose topic is public: the address may contain the token.
         print(f"operator_console: open {self.url}", flush=True)
         super().run()
 
     def loop(self) -> None:
-        """One round per reference; pictures at their own rate."""
+        """Publish references at the update rate and send frames at the frame rate."""
         ticker = Ticker(self.settings.update_rate)
-        every = max(1, round(self.settings.update_rate / self.settings.frame_rate))
+        divisor = max(1, round(self.settings.update_rate / self.settings.frame_rate))
         count = 0
         try:
             while self.context.ok():
                 ticker.wait()
-                self._obey()
-                self._lead()
-                if count % every == 0 and self._server.pages:
-                    self._show()
+                self._process_commands()
+                self._publish_references()
+                if count % divisor == 0 and self._server.pages:
+                    self._send_frame()
                 count += 1
         finally:
             self._server.stop()
 
-    def _obey(self) -> None:
-        """Passes on what pages have asked for, and what came of it."""
-        while not self._asked.empty():
-            page, said = self._asked.get_nowait()
-            if said.kind in ("stop", "reset"):
+    def _process_commands(self) -> None:
+        """Send queued commands to their services and responses to their pages."""
+        while not self._commands.empty():
+            page, command = self._commands.get_nowait()
+            if command.kind in ("stop", "reset"):
                 self._switch.release()
-                self._drive.drop()
-            if said.kind == "reset" and not self._status.stopped:
-                self._reset(page, said)
+                self._drive.reset()
+            if command.kind == "reset" and not self._status.stopped:
+                self._reset(page, command)
             else:
-                self._calls.ask(said, partial(self._answer, page, said))
-        self._calls.poll()
+                self._clients.send(command, partial(self._respond, page, command))
+        self._clients.poll()
         if self._server.pages:
-            self._calls.read(READ_PERIOD)
+            self._clients.read_parameters(PARAMETER_PERIOD)
 
-    def _reset(self, page: int, said: PageCommand) -> None:
-        """Resets between a stop and a resume: else the controller leads the team back again."""
+    def _reset(self, page: int, command: PageCommand) -> None:
+        """Reset between a stop and a resume, else the controller leads the team back."""
 
         def resume(done: bool, text: str) -> None:
-            self._calls.ask(
-                PageCommand("resume", {}), lambda *_: self._answer(page, said, done, text)
+            self._clients.send(
+                PageCommand("resume", {}), lambda *_: self._respond(page, command, done, text)
             )
 
         def reset(done: bool, text: str) -> None:
             if done:
-                self._calls.ask(said, resume)
+                self._clients.send(command, resume)
             else:
-                self._answer(page, said, done, text)
+                self._respond(page, command, done, text)
 
-        self._calls.ask(PageCommand("stop", {}), reset)
+        self._clients.send(PageCommand("stop", {}), reset)
 
-    def _answer(self, page: int, said: PageCommand, done: bool, text: str) -> None:
-        self._server.tell(page, {"kind": "answer", "ok": done, "text": text})
+    def _respond(self, page: int, command: PageCommand, done: bool, text: str) -> None:
+        self._server.send(page, {"kind": "response", "ok": done, "text": text})
         if done:
-            self._status.expect(said)
-            self._told_at = 0.0
+            self._status.expect(command)
+            self._status_at = 0.0
 
-    def _lead(self) -> None:
-        """Says what the held handle, pad or key asks for, or brings the motion to rest."""
+    def _publish_references(self) -> None:
+        """Publish references that follow the held input, or bring its motion to rest."""
         held = self._switch.held(time.monotonic())
         if held is None and not self._drive.active:
-            self._led_at = -1
+            self._reference_stamp = -1
             return
-        self._listen()
-        # In the team's own time: it may be slower than that of the page.
-        passed = seconds(self._ear.stamp - self._led_at) if self._led_at >= 0 else 0.0
-        step, self._led_at = min(max(0.0, passed), LONGEST_STEP), self._ear.stamp
-        scene = DriveState(self._ear.desired, self._stage.frames(self._ear.state), self._led())
-        stamp = self._ear.stamp if self.lockstep else self.get_clock().now().nanoseconds
-        for name, reference in self._drive.step(held, scene, step).items():
+        self._update_team_state()
+        team = self._team_state
+        # In the team's time, which may be slower than wall time.
+        elapsed = (
+            seconds(team.stamp - self._reference_stamp) if self._reference_stamp >= 0 else 0.0
+        )
+        step, self._reference_stamp = min(max(0.0, elapsed), MAX_STEP), team.stamp
+        state = DriveState(
+            desired=team.desired,
+            frames=self._scene.frames(team.state),
+            enabled=self._enabled_subtasks(),
+        )
+        stamp = team.stamp if self.lockstep else self.get_clock().now().nanoseconds
+        for name, reference in self._drive.step(held, state, step).items():
             codec, publisher = self._references[name]
             publisher.publish(
                 codec.encode(stamp, reference.position, reference.velocity, reference.acceleration)
             )
             self._sent += 1
 
-    def _led(self) -> frozenset[str]:
-        """Subtasks that the human leads, while the team is there and not stopped."""
+    def _enabled_subtasks(self) -> frozenset[str]:
+        """Return the subtasks with human authority, if the state is fresh and not stopped."""
         age = time.monotonic() - self._state_at
         if age > STALE or self._status.stopped:
             return frozenset()
-        parameters = self._calls.parameters
+        parameters = self._clients.parameters
         return frozenset(
-            name for name in self._drivables if parameters.get(f"{name}.authority") == "human"
+            name for name in self._drivable if parameters.get(f"{name}.authority") == "human"
         )
 
-    def _listen(self) -> None:
-        if self._ear.listen_to_joints():
+    def _update_team_state(self) -> None:
+        if self._team_state.update_state():
             self._state_at = time.monotonic()
-        self._ear.listen_to_motions()
+        self._team_state.update_motions()
 
-    def _show(self) -> None:
-        """Sends a picture, and now and then plots and status."""
+    def _send_frame(self) -> None:
+        """Send the poses of one frame, and plots and status at their own periods."""
         now = time.monotonic()
-        self._listen()
-        ear = self._ear
-        poses = self._stage.poses(ear.q, ear.state, ear.desired, ear.bodies)
-        self._server.tell_all(picture(seconds(max(0, ear.stamp)), poses))
-        if now - self._sampled_at >= SAMPLE_PERIOD:
-            self._sampled_at = now
-            ear.listen_to_energies()
-            sample = self._stage.sample(seconds(max(0, ear.stamp)), ear.state, ear.desired)
-            self._server.tell_all(json.dumps(sample | {"energy": ear.energy}))
-        if now - self._told_at >= STATUS_PERIOD:
-            self._told_at = now
-            told = self._status.told(self._calls.parameters, self._state_at)
-            told |= {
-                "driver": self._seat.driver,
+        self._update_team_state()
+        team = self._team_state
+        stamp = seconds(max(0, team.stamp))
+        poses = self._scene.poses(team.q, team.state, team.desired, team.bodies)
+        self._server.broadcast(encode_poses(stamp, poses))
+        if now - self._sample_at >= SAMPLE_PERIOD:
+            self._sample_at = now
+            team.update_energies()
+            sample = self._scene.sample(stamp, team.state, team.desired)
+            self._server.broadcast(json.dumps(sample | {"energy": team.energy}))
+        if now - self._status_at >= STATUS_PERIOD:
+            self._status_at = now
+            message = self._status.message(self._clients.parameters, self._state_at)
+            message |= {
+                "driver": self._lock.driver,
                 "pages": self._server.pages,
                 "held": getattr(self._switch.held(now), "subtask", None),
-                "refill": self._calls.offers("refill"),
+                "refill": self._clients.is_available("refill"),
             }
-            self._server.tell_all(json.dumps(told))
+            self._server.broadcast(json.dumps(message))
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
-        """Who drives, how many watch, what was refused."""
+        """Return driver, pages and rejected connections for `/diagnostics`."""
         held = self._switch.held(time.monotonic())
         values: dict[str, object] = {
             "pages": self._server.pages,
-            "driver": self._seat.driver or "none",
+            "driver": self._lock.driver or "none",
             "held": held.subtask if held else "nothing",
             "references sent": self._sent,
-            "refused connections": self._server.refused,
+            "refused connections": self._server.rejected,
         }
-        if self._seat.driver is None:
-            return Level.OK, "nobody drives", values
-        return Level.OK, f"driving {held.subtask}" if held else "nothing held", values
+        if self._lock.driver is None:
+            return Level.OK, "no driver", values
+        return Level.OK, f"driving {held.subtask}" if held else "no input held", values
 
     def destroy_node(self) -> None:
-        """Ends the server, then the node."""
+        """Stop the server, then destroy the node."""
         self._server.stop()
-        self._listener.destroy_node()
+        self._subscriber.destroy_node()
         super().destroy_node()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Run the node; return the exit status."""
     return run_program(OperatorConsole, arguments)

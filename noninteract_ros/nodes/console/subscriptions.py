@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the console hears: the newest message of each topic, taken when a picture needs it."""
+"""Subscriptions of the console: newest message of each topic, taken on demand."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -25,41 +25,48 @@ NEWEST = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 class LatestMessage:
-    """The newest message of one topic as bytes; no executor may know the node.
+    """Newest serialized message of one topic.
 
-    Nothing is done for the messages in between: at 1 kHz that is most of them.
+    Older messages are discarded without deserialization: at 1 kHz that is most of them.
+
+    Args:
+        node: Node without an executor.
+        message_type: Type of the messages.
+        topic: Name of the topic.
     """
 
-    def __init__(self, node: Node, kind: type, topic: str) -> None:
-        self._kind = kind
-        self._subscription = node.create_subscription(kind, topic, _unused, NEWEST, raw=True)
+    def __init__(self, node: Node, message_type: type, topic: str) -> None:
+        self._type = message_type
+        self._subscription = node.create_subscription(
+            message_type, topic, _unused, NEWEST, raw=True
+        )
 
     def take(self) -> bytes | None:
-        """The newest message, if there is one since the last call."""
+        """Return the newest message since the last call, or None."""
         newest = None
         handle = self._subscription.handle
         with handle:
-            while found := handle.take_message(self._kind, True):
+            while found := handle.take_message(self._type, True):
                 newest = found[0]
         return newest
 
 
 class ConsoleSubscriptions:
-    """The team as it was last heard of.
+    """Last received state of the team.
 
     Args:
-        node: A node that no executor knows.
+        node: Node without an executor.
         team: The robots.
-        stack: Their subtasks.
-        bodies: Names of bodies that tell their poses.
+        stack: The subtasks.
+        bodies: Names of the bodies that publish their poses.
 
     Attributes:
         stamp: Stamp of the newest state [ns]; -1 before the first.
         q: Configuration of the team, shape (nq,).
-        state: Value of each subtask, by name.
+        state: Measured value of each subtask, by name.
         desired: Desired value of each subtask, by name.
-        bodies: Pose of each body, shape (bodies, 7); NaN where it is not known.
-        energy: Named values of each subtask, and of the team under an empty name.
+        bodies: Pose of each body, shape (bodies, 7); NaN before the first message.
+        energy: Labelled energies of each subtask, and of the team under an empty name.
     """
 
     def __init__(self, node: Node, team: Team, stack: SubtaskStack, bodies: Iterable[str]) -> None:
@@ -76,9 +83,10 @@ class ConsoleSubscriptions:
             name: LatestMessage(node, motion, f"{name}/desired") for name in stack.names
         }
         self._body = [LatestMessage(node, PoseStamped, f"{name}/pose") for name in bodies]
-        accounts = {"": "energy"} | {name: f"{name}/energy" for name in stack.names}
+        energy_topics = {"": "energy"} | {name: f"{name}/energy" for name in stack.names}
         self._energy = {
-            name: LatestMessage(node, Float64MultiArray, topic) for name, topic in accounts.items()
+            name: LatestMessage(node, Float64MultiArray, topic)
+            for name, topic in energy_topics.items()
         }
         self.stamp = -1
         self.q = team.q0
@@ -87,8 +95,8 @@ class ConsoleSubscriptions:
         self.bodies = np.full((len(self._body), 7), np.nan)
         self.energy: dict[str, Mapping[str, float]] = {}
 
-    def listen_to_joints(self) -> bool:
-        """Takes the newest state; whether there was one. What is malformed is passed over."""
+    def update_state(self) -> bool:
+        """Read the newest joint state; return False if there is none or it is malformed."""
         data = self._joint_states.take()
         if data is None:
             return False
@@ -101,8 +109,8 @@ class ConsoleSubscriptions:
         self.stamp, self.q = stamp, self._team.configuration_from_joints(positions)
         return True
 
-    def listen_to_motions(self) -> None:
-        """Takes the newest values of subtasks and poses of bodies."""
+    def update_motions(self) -> None:
+        """Read the newest values of all subtasks and poses of all bodies."""
         for topics, values in ((self._state, self.state), (self._desired, self.desired)):
             for name, topic in topics.items():
                 data = topic.take()
@@ -121,19 +129,19 @@ class ConsoleSubscriptions:
             return None
         return None if isinstance(parsed, Marker) else parsed.position
 
-    def listen_to_energies(self) -> None:
-        """Takes the newest accounts."""
+    def update_energies(self) -> None:
+        """Read the newest energies."""
         for name, topic in self._energy.items():
             data = topic.take()
             if data is not None:
-                self.energy[name] = _named(deserialize_message(data, Float64MultiArray))
+                self.energy[name] = _labelled(deserialize_message(data, Float64MultiArray))
 
 
-def _named(message: Any) -> dict[str, float]:
+def _labelled(message: Any) -> dict[str, float]:
     labels = [dimension.label for dimension in message.layout.dim]
     pairs = zip(labels, message.data, strict=False)
     return {label: value for label, value in pairs if np.isfinite(value)}
 
 
 def _unused(message: bytes) -> None:
-    """Subscriptions must have a callback; no executor ever calls it."""
+    """Satisfy the subscription, which requires a callback; no executor calls it."""

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-// The page of operator_console: puts its parts together.
+// Page of operator_console: connects view, inputs, panel and plots to the server.
 
+import { Connection } from "./connection.js";
 import { Handle } from "./handle.js";
-import { Inputs } from "./held.js";
-import { Link } from "./link.js";
+import { Inputs } from "./inputs.js";
 import { Panel } from "./panel.js";
 import { Plots } from "./plots.js";
 import { Scene } from "./scene.js";
 
-const HOLD_PERIOD = 25; // [ms] at which what is held is said again
-const BEATS = 3; // One in so many periods says that the page is alive.
-const LAPSE = 1000; // [ms]
+const INPUT_PERIOD = 25; // [ms] between messages of a held input
+const HEARTBEAT_DIVISOR = 3; // Heartbeat once in so many input periods.
+const INPUT_TIMEOUT = 1000; // [ms]
 const MESHES = 1;
 
 const find = (id) => document.getElementById(id);
@@ -19,9 +19,9 @@ const scene = new Scene(find("canvas"));
 const handle = new Handle(scene);
 const inputs = new Inputs(find("pad-plane"), find("pad-height"));
 const plots = new Plots(find("plots"));
-const state = { hello: null, status: null, me: null, pictures: 0, held: null, since: 0 };
-const link = new Link({ onText, onBytes, onState });
-const send = (message) => link.send(message);
+const state = { hello: null, status: null, page: null, frames: 0, held: null, heldSince: 0 };
+const connection = new Connection({ onText, onBytes, onClose });
+const send = (message) => connection.send(message);
 const panel = new Panel(send);
 
 function onText(message) {
@@ -30,15 +30,15 @@ function onText(message) {
     panel.build(message);
     plots.clear();
     listHandles();
-  } else if (message.kind === "you") {
-    state.me = message.page;
+  } else if (message.kind === "welcome") {
+    state.page = message.page;
   } else if (message.kind === "status") {
     state.status = message;
     showStatus();
   } else if (message.kind === "sample") {
-    plots.take(message);
-  } else if (message.kind === "answer") {
-    panel.say(message.ok, message.text);
+    plots.update(message);
+  } else if (message.kind === "response") {
+    panel.notify(message.ok, message.text);
   }
 }
 
@@ -48,22 +48,22 @@ function onBytes(data) {
     scene.showGhosts(find("ghosts").checked);
     return;
   }
-  if (scene.take(data) === null) return;
-  state.pictures += 1;
+  if (scene.update(data) === null) return;
+  state.frames += 1;
   handle.follow();
 }
 
-function onState(text) {
-  Object.assign(state, { status: null, me: null });
+function onClose(text) {
+  Object.assign(state, { status: null, page: null });
   find("connection").textContent = text;
   find("connection").dataset.state = "bad";
-  find("driver").textContent = "nothing is driven; connecting again";
-  find("take").disabled = true;
+  find("driver").textContent = "not driving; reconnecting";
+  find("control").disabled = true;
   inputs.release();
   update();
 }
 
-const drives = () => state.me !== null && state.status?.driver === state.me;
+const drives = () => state.page !== null && state.status?.driver === state.page;
 
 function listHandles() {
   const { subtasks, drivable } = state.hello;
@@ -75,106 +75,110 @@ function listHandles() {
         return new Option(text, `${name}/${element}`);
       }),
     );
-  const before = find("what").value;
-  find("what").replaceChildren(...options);
-  if (options.some(({ value }) => value === before)) find("what").value = before;
+  const before = find("driven").value;
+  find("driven").replaceChildren(...options);
+  if (options.some(({ value }) => value === before)) find("driven").value = before;
   chooseMode();
 }
 
-function chosen() {
-  const [name, element] = find("what").value.split("/");
+function selected() {
+  const [name, element] = find("driven").value.split("/");
   const found = state.hello?.subtasks.find((subtask) => subtask.name === name);
   return { name, handle: found?.handles[Number(element)] };
 }
 
-// Why what is chosen cannot be driven now, in words; an empty text, where it can.
-function obstacle() {
+// Reason why the selected subtask cannot be driven now; empty if it can.
+function blockedReason() {
   const { status, hello } = state;
   if (!status) return "not connected";
-  if (status.stopped) return "stopped: everything you do has no effect until somebody resumes";
-  if (!drives()) return status.driver === null ? "take control to drive" : "somebody else drives";
-  if (!status.there) return status.paused ? "paused" : "the team is not there";
-  const { name, handle } = chosen();
+  if (status.stopped) return "stopped: inputs have no effect until a driver resumes";
+  if (!drives()) return status.driver === null ? "take control to drive" : "another page drives";
+  if (!status.live) return status.paused ? "paused" : "no joint states received";
+  const { name, handle } = selected();
   if (!handle) {
     const awaited = hello.awaited.join(", ");
     return awaited
-      ? `the scenario waits for another source of ${awaited}: see its key lockstep_sources`
-      : "nothing here can be driven";
+      ? `lockstep waits for another source of ${awaited}; see the key lockstep_sources`
+      : "no subtask can be driven";
   }
   const { authority } = status.subtasks[name];
-  if (authority !== "human") return `${name} is led by ${authority}: hand it over to human first`;
+  if (authority !== "human") return `${name}: authority is ${authority}; set it to human first`;
   return "";
 }
 
-// The program lets go of what a page was silent about for long, though a hand still holds it.
-const lapsed = () =>
-  state.held && !state.status?.held && performance.now() - state.since > LAPSE;
+// True if the server has released an input that is still held here, after a long stutter.
+const inputTimedOut = () =>
+  state.held && !state.status?.held && performance.now() - state.heldSince > INPUT_TIMEOUT;
 
 function showStatus() {
   const { status } = state;
-  const mine = drives();
+  const driving = drives();
   const [text, kind] = status.stopped
     ? ["STOPPED", "bad"]
-    : !status.there
-      ? [status.paused ? "paused" : "no states of the team", "warn"]
+    : !status.live
+      ? [status.paused ? "paused" : "no joint states", "warn"]
       : ["live", "good"];
   find("connection").textContent = text;
   find("connection").dataset.state = kind;
-  const others = `${status.pages} ${status.pages === 1 ? "page" : "pages"} open`;
-  const who = mine ? "you drive" : status.driver === null ? "nobody drives" : "somebody else drives";
-  find("driver").textContent = `${who}, ${others}`;
-  find("take").disabled = false;
-  find("take").textContent = mine
-    ? "Leave control"
+  const pages = `${status.pages} ${status.pages === 1 ? "page" : "pages"} open`;
+  const driver = driving
+    ? "you drive"
+    : status.driver === null
+      ? "no driver"
+      : "another page drives";
+  find("driver").textContent = `${driver}, ${pages}`;
+  find("control").disabled = false;
+  find("control").textContent = driving
+    ? "Release control"
     : status.driver === null
       ? "Take control"
       : "Take over";
-  find("take").classList.toggle("mine", mine);
+  find("control").classList.toggle("driving", driving);
   find("stop").classList.toggle("stopped", status.stopped);
   find("resume").hidden = !status.stopped;
-  find("resume").disabled = !mine;
-  panel.take(status, mine);
+  find("resume").disabled = !driving;
+  panel.update(status, driving);
   update();
 }
 
 function update() {
-  const reason = obstacle();
-  const { name, handle: wanted } = state.hello ? chosen() : {};
-  handle.show(name, reason ? null : wanted);
+  const reason = blockedReason();
+  const { name, handle: target } = state.hello ? selected() : {};
+  handle.show(name, reason ? null : target);
   find("hint").textContent =
-    reason || (lapsed() ? "not held any more: let go and take hold again" : "");
-  for (const pad of document.querySelectorAll(".pad")) pad.classList.toggle("able", !reason);
-  find("pad-height").hidden = Boolean(wanted) && !wanted.axes.includes("z") && !wanted.rotates;
+    reason || (inputTimedOut() ? "input timed out: release it and grab again" : "");
+  for (const pad of document.querySelectorAll(".pad")) pad.classList.toggle("enabled", !reason);
+  find("pad-height").hidden = Boolean(target) && !target.axes.includes("z") && !target.rotates;
 }
 
 function chooseMode() {
-  const { handle: wanted } = chosen();
-  find("turn").hidden = !wanted?.rotates;
-  const turning = Boolean(wanted?.rotates) && find("turn").getAttribute("aria-pressed") === "true";
-  handle.setMode(turning ? "rotate" : "translate");
+  const { handle: target } = selected();
+  find("rotate").hidden = !target?.rotates;
+  const rotating = Boolean(target?.rotates) && find("rotate").getAttribute("aria-pressed") === "true";
+  handle.setMode(rotating ? "rotate" : "translate");
   update();
 }
 
-// Says what is held, again and again: silence lets go. Runs by a timer, which a frozen page has not.
-let beat = 0;
+// Send the held input periodically: silence releases it. A frozen page has no timers.
+let period = 0;
 setInterval(() => {
-  const pushed = inputs.held();
-  const pulled = handle.held();
-  beat = (beat + 1) % BEATS;
-  if ((pushed || pulled) && !obstacle()) {
-    const { name, handle: what } = chosen();
-    const to = { subtask: name, element: what.element };
-    if (pulled) send({ kind: "drag", ...to, ...pulled });
-    else send({ kind: "push", ...to, ...pushed, by: undefined });
-    if (!state.held) state.since = performance.now();
-    state.held = pulled ? "handle" : pushed.by;
+  const twist = inputs.held();
+  const drag = handle.held();
+  period = (period + 1) % HEARTBEAT_DIVISOR;
+  if ((twist || drag) && !blockedReason()) {
+    const { name, handle: target } = selected();
+    const driven = { subtask: name, element: target.element };
+    if (drag) send({ kind: "drag", ...driven, ...drag });
+    else send({ kind: "twist", ...driven, ...twist, device: undefined });
+    if (!state.held) state.heldSince = performance.now();
+    state.held = drag ? "handle" : twist.device;
   } else if (state.held) {
     send({ kind: "release" });
     state.held = null;
-  } else if (beat === 0 && state.me !== null) {
-    send({ kind: "beat" });
+  } else if (period === 0 && state.page !== null) {
+    send({ kind: "heartbeat" });
   }
-}, HOLD_PERIOD);
+}, INPUT_PERIOD);
 
 function stop() {
   inputs.release();
@@ -183,12 +187,12 @@ function stop() {
 }
 
 find("stop").onpointerdown = stop;
-find("stop").onclick = (event) => event.detail === 0 && stop(); // By Enter, or a screen reader.
+find("stop").onclick = (event) => event.detail === 0 && stop(); // By Enter or a screen reader.
 addEventListener(
   "keydown",
   (event) => {
     if (event.code !== "Space") return;
-    // Wherever the cursor is, and before any button takes it for a click.
+    // Regardless of the focus, and before a focused button handles it as a click.
     event.preventDefault();
     event.stopPropagation();
     if (!event.repeat) stop();
@@ -201,30 +205,30 @@ addEventListener("keyup", (event) => event.code === "Space" && event.preventDefa
 addEventListener("blur", () => handle.release());
 document.addEventListener("visibilitychange", () => document.hidden && handle.release());
 find("resume").onclick = () => send({ kind: "resume" });
-find("take").onclick = () => send({ kind: drives() ? "leave" : "take" });
-find("what").onchange = chooseMode;
-find("turn").onclick = ({ currentTarget: button }) => {
+find("control").onclick = () => send({ kind: drives() ? "release_control" : "take_control" });
+find("driven").onchange = chooseMode;
+find("rotate").onclick = ({ currentTarget: button }) => {
   button.setAttribute("aria-pressed", String(button.getAttribute("aria-pressed") !== "true"));
   chooseMode();
 };
 find("ghosts").onchange = ({ target }) => scene.showGhosts(target.checked);
 
-let before = { drawn: 0, pictures: 0 };
+let last = { drawn: 0, frames: 0 };
 setInterval(() => {
-  const now = { drawn: scene.drawn, pictures: state.pictures };
-  const drawn = now.drawn - before.drawn;
-  find("rate").textContent = `${drawn} frames/s of ${now.pictures - before.pictures}`;
+  const now = { drawn: scene.drawn, frames: state.frames };
+  const drawn = now.drawn - last.drawn;
+  find("rate").textContent = `${drawn} of ${now.frames - last.frames} frames/s`;
   document.body.dataset.frames = String(drawn);
-  before = now;
+  last = now;
 }, 1000);
 
-// For tests and measurements: where to take hold of things.
+// Interface for tests and benchmarks.
 globalThis.operatorConsole = {
   arrow: (axis) => handle.arrow(axis),
   ring: (axis) => handle.ring(axis),
-  handle: () => handle.place.position.toArray(),
-  turn: () => handle.place.quaternion.toArray(),
-  pixel: (point) => scene.inWindow(scene.camera.position.clone().fromArray(point)),
+  handle: () => handle.object.position.toArray(),
+  rotation: () => handle.object.quaternion.toArray(),
+  pixel: (point) => scene.toWindow(scene.camera.position.clone().fromArray(point)),
   status: () => state.status,
   drives,
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who leads what, law and gains, simulation, diagnostics.
+// Side panel: authority, law and gains, simulation, diagnostics.
 
 const SOURCES = ["human", "autonomy", "hold"];
 const GAINS = ["stiffness", "damping"];
@@ -7,23 +7,23 @@ const GAINS = ["stiffness", "damping"];
 const find = (id) => document.getElementById(id);
 
 function element(kind, text = "", className = "") {
-  const made = document.createElement(kind);
-  made.textContent = text;
-  made.className = className;
-  return made;
+  const created = document.createElement(kind);
+  created.textContent = text;
+  created.className = className;
+  return created;
 }
 
 export class Panel {
   constructor(send) {
     this.send = send;
-    this.buttons = []; // Those that only a driver may press.
+    this.controls = []; // Enabled for the driver only.
     for (const kind of ["step", "reset", "refill"]) {
       find(kind).onclick = () => send({ kind });
-      this.buttons.push(find(kind));
+      this.controls.push(find(kind));
     }
     find("pause").onclick = () => send({ kind: "pause", on: !this.paused });
     find("law").onchange = ({ target }) => send({ kind: "law", law: target.value });
-    this.fixed = [...this.buttons, find("pause"), find("law")];
+    this.fixed = [...this.controls, find("pause"), find("law")];
   }
 
   build({ subtasks, laws }) {
@@ -31,7 +31,7 @@ export class Panel {
     find("subtasks").replaceChildren();
     find("gains").replaceChildren();
     this.rows = new Map();
-    this.buttons = [...this.fixed];
+    this.controls = [...this.fixed];
     for (const { name } of subtasks) {
       this.rows.set(name, { ...this.buildAuthority(name), gains: this.buildGains(name) });
     }
@@ -51,7 +51,7 @@ export class Panel {
       choices.append(button);
       return button;
     });
-    this.buttons.push(...buttons);
+    this.controls.push(...buttons);
     title.append(" ", silent);
     row.append(title, choices);
     find("subtasks").append(row);
@@ -69,44 +69,44 @@ export class Panel {
       const button = element("button", "Set");
       button.type = "button";
       const apply = () => {
-        const values = input.value.split(",").map((word) => (word.trim() ? Number(word) : NaN));
+        const values = input.value.split(",").map((item) => (item.trim() ? Number(item) : NaN));
         input.classList.remove("edited");
-        // Numbers that are none are refused by the program, which says so; NaN has no JSON.
+        // Reject them here, because JSON has no NaN. All other checks are the controller's.
         if (values.every(Number.isFinite)) {
           this.send({ kind: "gains", subtask: name, name: gain, values });
         } else {
-          this.say(false, `${gain} of ${name}: numbers with commas between them, please`);
+          this.notify(false, `${gain} of ${name}: enter numbers separated by commas`);
         }
       };
       input.oninput = () => input.classList.add("edited");
       input.onkeydown = ({ key }) => key === "Enter" && apply();
       button.onclick = apply;
-      this.buttons.push(input, button);
+      this.controls.push(input, button);
       row.append(element("span", gain), input, button);
       find("gains").append(row);
       return { gain, input };
     });
   }
 
-  take(status, drives) {
+  update(status, drives) {
     this.paused = status.paused;
-    find("pause").textContent = status.paused ? "Go on" : "Pause";
+    find("pause").textContent = status.paused ? "Continue" : "Pause";
     find("pause").setAttribute("aria-pressed", String(status.paused));
     find("refill").hidden = !status.refill;
     if (status.law && document.activeElement !== find("law")) find("law").value = status.law;
-    for (const [name, told] of Object.entries(status.subtasks)) {
+    for (const [name, subtask] of Object.entries(status.subtasks)) {
       const row = this.rows.get(name);
       if (!row) continue;
-      row.silent.textContent = told.silent ? `${told.authority} silent: holding` : "";
+      row.silent.textContent = subtask.silent ? `${subtask.authority} silent: holding` : "";
       for (const button of row.buttons) {
-        button.setAttribute("aria-pressed", String(button.dataset.source === told.authority));
+        button.setAttribute("aria-pressed", String(button.dataset.source === subtask.authority));
       }
       for (const { gain, input } of row.gains) {
-        const busy = document.activeElement === input || input.classList.contains("edited");
-        if (!busy && told[gain]) input.value = told[gain].join(", ");
+        const editing = document.activeElement === input || input.classList.contains("edited");
+        if (!editing && subtask[gain]) input.value = subtask[gain].join(", ");
       }
     }
-    for (const button of this.buttons) button.disabled = !drives;
+    for (const button of this.controls) button.disabled = !drives;
     find("step").disabled = !drives || !status.paused;
     find("programs").replaceChildren(
       ...status.programs.map(({ name, level, text }) => {
@@ -117,10 +117,10 @@ export class Panel {
     );
   }
 
-  say(ok, text) {
+  notify(ok, text) {
     const line = element("p", text, ok ? "" : "bad");
-    find("answers").append(line);
-    while (find("answers").children.length > 3) find("answers").firstChild.remove();
+    find("responses").append(line);
+    while (find("responses").children.length > 3) find("responses").firstChild.remove();
     setTimeout(() => line.remove(), ok ? 3000 : 7000);
   }
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The 3-D view: the team, its references as ghosts, what is around it.
+// 3-D view: team, ghost at the desired values, environment.
 
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
@@ -16,7 +16,7 @@ function material(robot, ghost) {
       transparent: true,
       opacity: 0.28,
       depthWrite: false,
-      // Where ghost and robot are at the same place, the robot is seen.
+      // Draw the robot in front of a ghost at the same pose.
       polygonOffset: true,
       polygonOffsetFactor: 2,
       polygonOffsetUnits: 2,
@@ -24,8 +24,7 @@ function material(robot, ghost) {
   });
 }
 
-// Meshes: kind u4, then of each one the number of corners u4, corners f4, normals i1; see
-// console/shapes.py.
+// Decode meshes; console/frames.py defines the format.
 function readMeshes(data) {
   const view = new DataView(data);
   const meshes = [];
@@ -69,8 +68,8 @@ export class Scene {
     const grid = new THREE.GridHelper(6, 24, "#8d98a5", "#bcc6d1");
     grid.rotation.x = Math.PI / 2;
     this.scene.add(grid, new THREE.AxesHelper(0.25));
-    this.stage = new THREE.Group();
-    this.scene.add(this.stage);
+    this.group = new THREE.Group();
+    this.scene.add(this.group);
     this.handles = new Map();
     this.dirty = true;
     this.drawn = 0;
@@ -100,24 +99,24 @@ export class Scene {
   }
 
   build(hello, data) {
-    this.stage.clear();
+    this.group.clear();
     this.hello = hello;
-    this.framed = false;
+    this.fitted = false;
     const meshes = readMeshes(data);
     const groups = (count) => Array.from({ length: count }, () => new THREE.Group());
     const world = new THREE.Group();
     [this.joints, this.ghosts] = [groups(hello.joints), groups(hello.joints)];
     this.bodies = groups(hello.bodies);
     this.ghost = new THREE.Group();
-    const places = [world, ...this.joints, ...this.bodies];
+    const parents = [world, ...this.joints, ...this.bodies];
     for (const { joint, robot } of hello.shapes) {
       const geometry = meshes.shift();
-      places[joint].add(new THREE.Mesh(geometry, material(robot, false)));
-      const shadow = this.ghosts[joint - 1];
-      if (shadow) shadow.add(new THREE.Mesh(geometry, material(robot, true)));
+      parents[joint].add(new THREE.Mesh(geometry, material(robot, false)));
+      const ghost = this.ghosts[joint - 1];
+      if (ghost) ghost.add(new THREE.Mesh(geometry, material(robot, true)));
     }
     if (hello.joints) this.ghost.add(...this.ghosts);
-    this.stage.add(...places, this.ghost);
+    this.group.add(...parents, this.ghost);
     this.buildWalls(hello);
     this.buildHandles(hello);
     this.buildEdges(hello);
@@ -135,12 +134,12 @@ export class Scene {
           side: THREE.DoubleSide,
         }),
       );
-      const facing = new THREE.Vector3(...normal).normalize();
-      const across = Math.abs(facing.z) > 0.9 ? new THREE.Vector3(0, 1, 0) : UP;
-      wall.up.copy(across);
+      const direction = new THREE.Vector3(...normal).normalize();
+      const up = Math.abs(direction.z) > 0.9 ? new THREE.Vector3(0, 1, 0) : UP;
+      wall.up.copy(up);
       wall.position.set(...point);
-      wall.lookAt(facing.add(wall.position));
-      this.stage.add(wall);
+      wall.lookAt(direction.add(wall.position));
+      this.group.add(wall);
     }
   }
 
@@ -153,45 +152,45 @@ export class Scene {
 
   buildEdges({ edges, robots }) {
     this.tools = robots.map(() => new THREE.Group());
-    const places = new THREE.BufferAttribute(new Float32Array(6 * edges.length), 3);
-    const geometry = new THREE.BufferGeometry().setAttribute("position", places);
-    const look = new THREE.LineBasicMaterial({ color: "#5c6673" });
-    this.edges = new THREE.LineSegments(geometry, look);
+    const positions = new THREE.BufferAttribute(new Float32Array(6 * edges.length), 3);
+    const geometry = new THREE.BufferGeometry().setAttribute("position", positions);
+    const lineMaterial = new THREE.LineBasicMaterial({ color: "#5c6673" });
+    this.edges = new THREE.LineSegments(geometry, lineMaterial);
     this.edges.frustumCulled = false;
-    this.stage.add(this.edges);
+    this.group.add(this.edges);
   }
 
-  // A picture: see console/frames.py.
-  take(data) {
+  // Draw a frame of poses; console/frames.py defines the format. Returns its time [s], or null.
+  update(data) {
     const view = new DataView(data);
     if (!this.hello || (data.byteLength - 16) / 28 !== view.getUint32(4, true)) return null;
     const poses = new Float32Array(data, 16);
     let at = 0;
-    const each = (objects) => {
+    const placeAll = (objects) => {
       for (const object of objects) {
         place(object, poses, at);
         at += 7;
       }
     };
-    each(this.joints);
-    each(this.ghosts);
-    each(this.bodies);
-    each(this.handles.values());
-    each(this.tools);
+    placeAll(this.joints);
+    placeAll(this.ghosts);
+    placeAll(this.bodies);
+    placeAll(this.handles.values());
+    placeAll(this.tools);
     const line = this.edges.geometry.attributes.position;
     this.hello.edges.flat().forEach((tool, corner) => {
       line.setXYZ(corner, ...this.tools[tool].position.toArray());
     });
     line.needsUpdate = true;
-    if (!this.framed) this.frame();
+    if (!this.fitted) this.fitCamera();
     this.redraw();
     return view.getFloat64(8, true);
   }
 
-  // Looks at the whole team from the front and above, so that +x is to the right.
-  frame() {
+  // Fit the camera to the team: from the front and above, +x to the right.
+  fitCamera() {
     const box = new THREE.Box3();
-    this.stage.updateMatrixWorld(true);
+    this.group.updateMatrixWorld(true);
     for (const object of [...this.joints, ...this.tools, ...this.bodies]) {
       if (object.visible) box.expandByObject(object);
     }
@@ -202,7 +201,7 @@ export class Scene {
     this.orbit.target.copy(ball.center);
     this.camera.position.set(0, -0.75, 0.66).multiplyScalar(distance).add(ball.center);
     this.orbit.update();
-    this.framed = true;
+    this.fitted = true;
   }
 
   showGhosts(shown) {
@@ -210,10 +209,10 @@ export class Scene {
     this.redraw();
   }
 
-  // Where a point of the world is in the window [px].
-  inWindow(point) {
-    const seen = point.clone().project(this.camera);
+  // Window coordinates of a point in the world [px].
+  toWindow(point) {
+    const projected = point.clone().project(this.camera);
     const box = this.renderer.domElement.getBoundingClientRect();
-    return [box.x + ((seen.x + 1) / 2) * box.width, box.y + ((1 - seen.y) / 2) * box.height];
+    return [box.x + ((projected.x + 1) / 2) * box.width, box.y + ((1 - projected.y) / 2) * box.height];
   }
 }

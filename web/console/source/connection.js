@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-// The connection to the console's program; it comes back by itself.
+// WebSocket connection to operator_console with automatic reconnection.
 
-const VERSION = 1;
-const RETRY = 1000; // [ms]
+const VERSION = 2;
+const RETRY_PERIOD = 1000; // [ms]
 const TOKEN = "token";
 
-// The part after # never leaves the browser: the token is kept for this tab only.
-function token() {
-  const given = new URLSearchParams(location.hash.slice(1)).get(TOKEN);
-  if (given) {
-    sessionStorage.setItem(TOKEN, given);
+// Browsers do not send the part after #. The token is stored for this tab only.
+function readToken() {
+  const token = new URLSearchParams(location.hash.slice(1)).get(TOKEN);
+  if (token) {
+    sessionStorage.setItem(TOKEN, token);
     history.replaceState(null, "", location.pathname);
   }
   return sessionStorage.getItem(TOKEN) ?? "";
 }
 
-export class Link {
-  constructor({ onText, onBytes, onState }) {
-    Object.assign(this, { onText, onBytes, onState });
-    this.token = token();
+export class Connection {
+  constructor({ onText, onBytes, onClose }) {
+    Object.assign(this, { onText, onBytes, onClose });
+    this.token = readToken();
     this.connect();
   }
 
@@ -36,8 +36,8 @@ export class Link {
     };
     socket.onclose = ({ code, reason }) => {
       this.socket = null;
-      this.onState(reason || (code === 1006 ? "not connected" : `closed (${code})`));
-      setTimeout(() => this.connect(), RETRY);
+      this.onClose(reason || (code === 1006 ? "not connected" : `closed (${code})`));
+      setTimeout(() => this.connect(), RETRY_PERIOD);
     };
   }
 

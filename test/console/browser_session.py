@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A team, its console and a real browser, for tests that look and touch as a person does."""
+"""Team, console and real browser for end-to-end tests of the page."""
 
 from __future__ import annotations
 
@@ -24,42 +24,42 @@ from waiting import DEADLINE, until
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
 
-TOKEN = "known to those who may"
-OUTPUT = ROOT / "build" / "console"  # Screenshots, to be looked at.
-NAMES = ["robot_team", "controller", "relative_planner", "operator_console"]
+TOKEN = "the configured token"
+OUTPUT = ROOT / "build" / "console"  # Folder of screenshots.
+PROGRAMS = ["robot_team", "controller", "relative_planner", "operator_console"]
 RATE = 200.0
 FLAGS = (
     "--no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
     " --disable-component-update --disable-sync --use-gl=angle --use-angle=swiftshader"
     " --enable-unsafe-swiftshader"
 )
-SLOW = 1e-3  # [m/s] below which the team is at rest
-# A gamepad that tests can press; nothing is held while it is null.
+REST_SPEED = 1e-3  # [m/s] below which the team is at rest
+# Emulated gamepad; null: not connected.
 GAMEPAD = "window.pad = null; navigator.getGamepads = () => [window.pad];"
 
 
 def chromium() -> str | None:
-    """Debian's Chromium, if it is installed."""
+    """Return the path of Chromium, or None if it is not installed."""
     return shutil.which("chromium")
 
 
-def missing() -> str:
-    """What a real browser needs and is not here; an empty text, where all is."""
+def missing_browser() -> str:
+    """Return the reason why no browser can be started; empty if one can."""
     if chromium() is None:
-        return "no chromium here: apt-get install chromium"
-    return "" if find_spec("playwright") else "no playwright here: pip install playwright"
+        return "chromium is not installed: apt-get install chromium"
+    return "" if find_spec("playwright") else "playwright is not installed: pip install playwright"
 
 
 def launch(playwright: Playwright) -> Browser:
-    """A browser with an empty profile."""
+    """Start a browser with an empty profile."""
     return playwright.chromium.launch(executable_path=chromium(), args=FLAGS.split())
 
 
 def scenario() -> dict[str, Any]:
-    """Two point masses at rest, led by a human, in lockstep that keeps to wall time.
+    """Return a scenario of two point masses under human authority, in lockstep at wall time.
 
-    The object of the paper is left out: its mass is not in the model, so that the team would
-    creep after its reference for seconds.
+    It has no object: its mass is not in the model, so that the team would follow its reference
+    only slowly.
     """
     return paper(
         rate=RATE,
@@ -76,45 +76,45 @@ def scenario() -> dict[str, Any]:
     )
 
 
-class Show:
-    """What a team with a console does.
+class BrowserSession:
+    """A running team with a console and a browser.
 
     Attributes:
-        browser: Opens pages.
-        ear: Every state of the team.
-        port: Where the console listens.
-        ros: For what tests ask of the team besides.
+        browser: The browser.
+        ear: Received states and diagnostics of the team.
+        port: Port of the console.
+        ros: ROS context of the test.
     """
 
     def __init__(self, browser: Browser, ear: Ear, port: int, ros: Ros) -> None:
         self.browser, self.ear, self.port, self.ros = browser, ear, port, ros
-        until(lambda: len(ear.states) > 10, "the team moves")
+        until(lambda: len(ear.states) > 10, "states of the team")
 
     @classmethod
-    def open(cls, ros: Ros, programs: Programs, browser: Browser) -> Show:
-        """The programs of a scenario, one by one."""
+    def open(cls, ros: Ros, programs: Programs, browser: Browser) -> BrowserSession:
+        """Start the programs of the scenario, one after the other."""
         values = scenario()
         ear = ros.ear(values)
         programs.environment |= {"NONINTERACT_CONSOLE_TOKEN": TOKEN}
-        for name in NAMES:
+        for name in PROGRAMS:
             programs.start(name, values)
-        for name in NAMES:  # Each has a deadline of its own: together they start slowly.
-            until(partial(ear.status.__contains__, name), f"{name} speaks")
-        return cls(browser, ear, address(programs, NAMES[3]), ros)
+        for name in PROGRAMS:  # Each has its own deadline, since they start slowly together.
+            until(partial(ear.status.__contains__, name), f"diagnostics of {name}")
+        return cls(browser, ear, console_port(programs, PROGRAMS[3]), ros)
 
     @contextmanager
     def page(
         self, drives: bool = True, port: int = 0, size: tuple[int, int] = (1024, 700)
     ) -> Iterator[Page]:
-        """A page that is open and knows the team; it drives, where asked for."""
+        """Open a page, wait for the state of the team, and take control if it drives."""
         context = self.browser.new_context(viewport={"width": size[0], "height": size[1]})
         context.add_init_script(GAMEPAD)
         page = context.new_page()
         page.set_default_timeout(1e3 * DEADLINE)
         page.goto(f"http://127.0.0.1:{port or self.port}/#token={TOKEN}")
-        wait(page, "operatorConsole.status()?.there")
+        wait(page, "operatorConsole.status()?.live")
         if drives:
-            page.click("#take")
+            page.click("#control")
             wait(page, "operatorConsole.drives()")
             page.bring_to_front()
         try:
@@ -123,78 +123,80 @@ class Show:
             context.close()
 
     def centre(self) -> np.ndarray:
-        """Where the team's middle is now, shape (2,) [m]."""
+        """Return the centre of the team, shape (2,) [m]."""
         positions = self.ear.newest().position
         return positions.reshape(2, 2).mean(axis=0)
 
     def speed(self) -> float:
-        """Of the fastest joint now [m/s]."""
+        """Return the speed of the fastest joint [m/s]."""
         return float(np.abs(self.ear.newest().velocity).max())
 
-    def moves(self, faster: float = 0.1, pressed: Page | None = None) -> None:
-        """Waits until the team moves at a good speed.
+    def wait_until_moving(self, faster: float = 0.1, pressed: Page | None = None) -> None:
+        """Wait until the team moves faster than a speed [m/s].
 
-        A page that has stuttered for long on a busy machine has let go; then the pad that is
-        pressed there is pressed anew.
+        On a busy machine the input of a page may time out; then its pad is pressed again.
         """
 
         def moving() -> bool:
-            if pressed is not None and pressed.inner_text("#hint").startswith("not held"):
+            if pressed is not None and pressed.inner_text("#hint").startswith("input timed out"):
                 pressed.mouse.up()
                 pressed.mouse.down()
             return self.speed() > faster
 
         until(moving, lambda: f"the team moves, not {self.speed()} m/s")
 
-    def rests(self) -> None:
-        """Waits until the team is at rest."""
-        until(lambda: self.stays(0.1), lambda: f"the team is at rest, not at {self.speed()} m/s")
+    def wait_until_rest(self) -> None:
+        """Wait until the team is at rest."""
+        until(
+            lambda: self.stays_at_rest(0.1),
+            lambda: f"the team is at rest, not at {self.speed()} m/s",
+        )
 
-    def rest_after(self, release: Callable[[], None]) -> float:
-        """Time of the team from a release at a good speed to rest [s], by the states' stamps.
+    def stopping_time(self, release: Callable[[], None]) -> float:
+        """Return the team's time from a release in motion to rest [s], by the states' stamps.
 
-        It counts from when the release is done. The team's time is never faster than the wall's,
-        so that a slow machine makes it shorter.
+        It counts from the end of the release. The team's time is never faster than wall time, so
+        that a slow machine makes it shorter.
         """
-        self.moves()
+        self.wait_until_moving()
         release()
-        began = self.ear.now
-        self.rests()
+        start = self.ear.now
+        self.wait_until_rest()
         times, _, v, _ = self.ear.history(self.ear.states)
-        moving = (np.abs(v).max(axis=1) >= SLOW) & (times >= began)
-        return float(times[moving][-1] - began) if moving.any() else 0.0
+        moving = (np.abs(v).max(axis=1) >= REST_SPEED) & (times >= start)
+        return float(times[moving][-1] - start) if moving.any() else 0.0
 
-    def stays(self, seconds: float = 0.3) -> bool:
-        """Whether the team rests for so long of its own time [s]."""
-        began = self.ear.now
-        until(lambda: self.ear.now > began + seconds, "some more states")
+    def stays_at_rest(self, seconds: float = 0.3) -> bool:
+        """Return True if the team rests for a duration of its own time [s]."""
+        start = self.ear.now
+        until(lambda: self.ear.now > start + seconds, "further states")
         times, _, v, _ = self.ear.history(self.ear.states)
-        return bool((np.abs(v[times >= began]) < SLOW).all())
+        return bool((np.abs(v[times >= start]) < REST_SPEED).all())
 
 
 def wait(page: Page, condition: str) -> None:
-    """Waits until something is true in a page."""
-    # Not by `wait_for_function`, whose way to ask again the page's policy forbids.
+    """Wait until a JavaScript expression is true in a page."""
+    # `wait_for_function` polls in a way that the page's content policy forbids.
     until(lambda: page.evaluate(condition), condition)
 
 
-def shoot(page: Page, name: str) -> None:
-    """Keeps a picture of a page."""
+def take_screenshot(page: Page, name: str) -> None:
+    """Write a screenshot of a page."""
     OUTPUT.mkdir(parents=True, exist_ok=True)
     page.screenshot(path=OUTPUT / f"{name}.png")
 
 
-def drag(page: Page, axis: str, by: tuple[float, float], part: str = "arrow") -> None:
-    """Takes the handle's arrow or ring of an axis, pulls it by so many pixels, and holds it."""
+def drag(page: Page, axis: str, offset: tuple[float, float], part: str = "arrow") -> None:
+    """Drag the handle's arrow or ring of an axis by some pixels, and keep holding it."""
     x, y = page.evaluate(f"operatorConsole.{part}('{axis}')")
     page.mouse.move(x, y)
     page.mouse.down()
     for step in range(1, 11):
-        page.mouse.move(x + by[0] * step / 10, y + by[1] * step / 10)
+        page.mouse.move(x + offset[0] * step / 10, y + offset[1] * step / 10)
 
 
 def press_pad(page: Page, right: float, up: float) -> None:
-    """Pushes the pad of the plane; it stays held."""
+    """Press the pad of the plane, and keep holding it."""
     box = page.locator("#pad-plane").bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
@@ -204,8 +206,8 @@ def press_pad(page: Page, right: float, up: float) -> None:
 
 
 @contextmanager
-def frozen(browser: Browser) -> Iterator[None]:
-    """Stops all processes that run pages, as `kill -STOP` does."""
+def suspended_pages(browser: Browser) -> Iterator[None]:
+    """Suspend all renderer processes with SIGSTOP."""
     session = browser.new_browser_cdp_session()
     found = session.send("SystemInfo.getProcessInfo")["processInfo"]
     pids = [item["id"] for item in found if item["type"] == "renderer"]
@@ -219,16 +221,16 @@ def frozen(browser: Browser) -> Iterator[None]:
             os.kill(pid, signal.SIGCONT)
 
 
-def address(programs: Programs, name: str) -> int:
-    """Port of the console that a program has printed."""
+def console_port(programs: Programs, name: str) -> int:
+    """Return the port of the console from the address that a program has printed."""
     found = until(
         lambda: re.search(r"http://127\.0\.0\.1:(\d+)/", programs.log(name)), "the address"
     )
     return int(found[1])
 
 
-class Relay:
-    """A link between page and console that can be cut: then nobody is told, and nothing comes.
+class CutRelay:
+    """TCP relay between page and console that can drop all data while both ends stay open.
 
     Args:
         port: Port of the console.
@@ -267,11 +269,11 @@ class Relay:
             return
 
     def cut(self) -> None:
-        """Passes on nothing from now on; both ends stay open."""
+        """Drop all data from now on; both ends stay open."""
         self._cut.set()
 
     def close(self) -> None:
-        """Ends everything."""
+        """Close all sockets."""
         self._listener.close()
         for item in self._sockets:
             item.close()

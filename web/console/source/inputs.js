@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Everything that a person can hold: pads, keys, a gamepad. All is let go when the page is left.
+// Inputs that an operator holds: pads, keys, gamepad. All are released when the page loses focus.
 
 const DEADZONE = 0.12;
-const SHOULDERS = [4, 5]; // Buttons of the standard mapping, either of which must be held.
+const ENABLE_BUTTONS = [4, 5]; // Shoulder buttons of the standard mapping; one must be held.
 const KEYS = {
   ArrowRight: ["linear", 0, 1],
   ArrowLeft: ["linear", 0, -1],
@@ -22,8 +22,8 @@ const KEYS = {
   KeyO: ["angular", 1, -1],
 };
 
-const within = (value) => Math.max(-1, Math.min(1, value));
-const live = (value) => (Math.abs(value) < DEADZONE ? 0 : within(value));
+const clamp = (value) => Math.max(-1, Math.min(1, value));
+const withDeadzone = (value) => (Math.abs(value) < DEADZONE ? 0 : clamp(value));
 
 class Pad {
   constructor(element) {
@@ -47,17 +47,17 @@ class Pad {
 
   move(event) {
     const box = this.element.getBoundingClientRect();
-    const reach = 0.36 * box.width;
-    const x = (event.clientX - box.left - box.width / 2) / reach;
-    const y = -(event.clientY - box.top - box.height / 2) / reach;
+    const radius = 0.36 * box.width;
+    const x = (event.clientX - box.left - box.width / 2) / radius;
+    const y = -(event.clientY - box.top - box.height / 2) / radius;
     const size = Math.max(1, Math.hypot(x, y));
     this.value = [x / size, y / size];
-    this.show(reach);
+    this.show(radius);
   }
 
-  show(reach) {
+  show(radius) {
     const [x, y] = this.value;
-    this.knob.style.transform = `translate(${x * reach}px, ${-y * reach}px)`;
+    this.knob.style.transform = `translate(${x * radius}px, ${-y * radius}px)`;
   }
 
   release() {
@@ -67,7 +67,7 @@ class Pad {
   }
 }
 
-const typing = (target) => target.closest?.("input:not([type=checkbox]), select, textarea") != null;
+const isTextField = (target) => target.closest?.("input:not([type=checkbox]), select, textarea") != null;
 
 export class Inputs {
   constructor(plane, height) {
@@ -75,9 +75,9 @@ export class Inputs {
     this.height = new Pad(height);
     this.keys = new Set();
     this.grab = 0;
-    this.before = null;
+    this.lastDevice = null;
     addEventListener("keydown", (event) => {
-      if (!(event.code in KEYS) || typing(event.target)) return;
+      if (!(event.code in KEYS) || isTextField(event.target)) return;
       if (event.ctrlKey || event.metaKey || event.altKey) return;
       event.preventDefault();
       this.keys.add(event.code);
@@ -93,36 +93,38 @@ export class Inputs {
     this.keys.clear();
   }
 
-  // Shares of the largest rates; null while nothing is held.
+  // Normalized twist; null while nothing is held.
   held() {
     const linear = [0, 0, 0];
     const angular = [0, 0, 0];
-    const rates = { linear, angular };
-    let by = null;
+    const twist = { linear, angular };
+    let device = null;
     if (this.plane.held || this.height.held) {
-      by = "pad";
+      device = "pad";
       [linear[0], linear[1]] = this.plane.value;
       linear[2] = this.height.value[1];
       angular[2] = -this.height.value[0];
     } else if (this.keys.size) {
-      by = "keys";
+      device = "keys";
       for (const code of this.keys) {
         const [kind, axis, sign] = KEYS[code];
-        rates[kind][axis] += sign;
+        twist[kind][axis] += sign;
       }
     } else {
       const pad = [...(navigator.getGamepads?.() ?? [])].find(
-        (one) => one?.connected && SHOULDERS.some((button) => one.buttons[button]?.pressed),
+        (one) => one?.connected && ENABLE_BUTTONS.some((button) => one.buttons[button]?.pressed),
       );
       if (pad) {
-        by = "gamepad";
-        const [x = 0, y = 0, turn = 0, z = 0] = pad.axes;
-        [linear[0], linear[1], linear[2]] = [live(x), -live(y), -live(z)];
-        angular[2] = -live(turn);
+        device = "gamepad";
+        const [x = 0, y = 0, yaw = 0, z = 0] = pad.axes;
+        [linear[0], linear[1], linear[2]] = [withDeadzone(x), -withDeadzone(y), -withDeadzone(z)];
+        angular[2] = -withDeadzone(yaw);
       }
     }
-    if (by && by !== this.before) this.grab += 2;
-    this.before = by;
-    return by && { by, grab: this.grab, linear: linear.map(within), angular: angular.map(within) };
+    if (device && device !== this.lastDevice) this.grab += 2;
+    this.lastDevice = device;
+    if (!device) return null;
+    const { grab } = this;
+    return { device, grab, linear: linear.map(clamp), angular: angular.map(clamp) };
   }
 }
