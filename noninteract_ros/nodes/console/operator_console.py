@@ -64,7 +64,7 @@ class OperatorConsole(ScenarioNode):
         self._team_state = ConsoleSubscriptions(
             self._subscriber, team, stack, self._scene.body_names
         )
-        self._clients = ServiceClients(self, stack.names)
+        self._service_clients = ServiceClients(self, stack.names)
         self._commands: queue.SimpleQueue[tuple[int, PageCommand]] = queue.SimpleQueue()
         self._switch = DeadMansSwitch(self.settings.hold_timeout)
         self._lock = DriverLock(self._switch)
@@ -157,26 +157,26 @@ class OperatorConsole(ScenarioNode):
             if command.kind == "reset" and not self._status.stopped:
                 self._reset(page, command)
             else:
-                self._clients.send(command, partial(self._respond, page, command))
-        self._clients.poll()
+                self._service_clients.send(command, partial(self._respond, page, command))
+        self._service_clients.poll()
         if self._server.pages:
-            self._clients.read_parameters(PARAMETER_PERIOD)
+            self._service_clients.read_parameters(PARAMETER_PERIOD)
 
     def _reset(self, page: int, command: PageCommand) -> None:
         """Reset between a stop and a resume, else the controller leads the team back."""
 
         def resume(done: bool, text: str) -> None:
-            self._clients.send(
+            self._service_clients.send(
                 PageCommand("resume", {}), lambda *_: self._respond(page, command, done, text)
             )
 
         def reset(done: bool, text: str) -> None:
             if done:
-                self._clients.send(command, resume)
+                self._service_clients.send(command, resume)
             else:
                 self._respond(page, command, done, text)
 
-        self._clients.send(PageCommand("stop", {}), reset)
+        self._service_clients.send(PageCommand("stop", {}), reset)
 
     def _respond(self, page: int, command: PageCommand, done: bool, text: str) -> None:
         self._server.send(page, {"kind": "response", "ok": done, "text": text})
@@ -215,7 +215,7 @@ class OperatorConsole(ScenarioNode):
         age = time.monotonic() - self._state_at
         if age > STALE or self._status.stopped:
             return frozenset()
-        parameters = self._clients.parameters
+        parameters = self._service_clients.parameters
         return frozenset(
             name for name in self._drivable if parameters.get(f"{name}.authority") == "human"
         )
@@ -240,12 +240,12 @@ class OperatorConsole(ScenarioNode):
             self._server.broadcast(json.dumps(sample | {"energy": team.energy}))
         if now - self._status_at >= STATUS_PERIOD:
             self._status_at = now
-            message = self._status.message(self._clients.parameters, self._state_at)
+            message = self._status.message(self._service_clients.parameters, self._state_at)
             message |= {
                 "driver": self._lock.driver,
                 "pages": self._server.pages,
                 "held": getattr(self._switch.held(now), "subtask", None),
-                "refill": self._clients.is_available("refill"),
+                "refill": self._service_clients.is_available("refill"),
             }
             self._server.broadcast(json.dumps(message))
 
