@@ -89,7 +89,7 @@ def unlike_work(period: float) -> tuple[float, float]:
     return counted, apart
 
 
-def test_torque_and_turn_are_power_conjugate() -> None:
+def test_torque_and_rotation_are_power_conjugate() -> None:
     """What the account counts is the energy of a hand that turns freely, but for the sampling.
 
     The axes of torque and turn change; what is left falls with the tick.
