@@ -2,7 +2,8 @@
 """A scenario: the one file that every program of a run is started with."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any
 
 from noninteract_ros.control.controller import TeamController
@@ -160,8 +161,7 @@ class Scenario:
             if robot not in self.robots:
                 raise ScenarioError("force_sensors", repr(robot), one_of(self.robots, robot))
         self._check_topics()
-        team = self.build_team()
-        stack = self.build_stack(team)
+        team, stack = self.team, self.stack
         self.build_controller(team, stack)
         for push_name, push in self.pushes.items():
             push.check(push_name, team)
@@ -181,6 +181,20 @@ class Scenario:
             if self.has_robot_state_topics and not block.topics.joint_states_topic:
                 path, found = join(name, "joint_states_topic"), "nothing"
                 raise ScenarioError(path, found, "a topic for every robot, or for none")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the blocks alone, since models cannot be pickled cheaply."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @cached_property
+    def team(self) -> Team:
+        """Robot team of this scenario, built once; not for use in several threads."""
+        return self.build_team()
+
+    @cached_property
+    def stack(self) -> SubtaskStack:
+        """Subtasks of `team`, built once."""
+        return self.build_stack(self.team)
 
     def build_team(self) -> Team:
         """The robots as one model."""

@@ -2,6 +2,7 @@
 """A robot team as one Pinocchio model: equations (1) to (3)."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -103,6 +104,14 @@ class Team:
         )
         self._constant: TeamState | None = None
         self._tool_inverses = Memo(self._compute_tool_inverses)
+
+    def with_own_data(self) -> "Team":
+        """Return the same team with computation data of its own, for use in another thread."""
+        team = copy(self)
+        team._data = self.model.createData()
+        team._constant = None
+        team._tool_inverses = Memo(team._compute_tool_inverses)
+        return team
 
     @staticmethod
     def _slices(sizes: Sequence[int]) -> tuple[slice, ...]:
