@@ -183,7 +183,7 @@ class Hall:
 
     def turn(self) -> None:
         """The controller takes a turn, and the drivers hear what it says."""
-        self.controller.turn()
+        self.controller.run_once()
         for driver in self.drivers.values():
             said = self.controller.said[driver.effort_topic]
             if said:

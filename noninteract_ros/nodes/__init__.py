@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The programs: thin rclpy nodes around the core."""
+"""ROS 2 nodes: thin rclpy wrappers around the core."""
 
 import os
 from pathlib import Path
 
-# Matrices of a team are small; BLAS threads would only fight over the cores with other nodes.
+# Matrices of a team are small; BLAS threads would only compete with other nodes for the cores.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-# Fast DDS's shared memory has locks that a killed program keeps: whoever speaks to it, a
-# controller for instance, then stands still for seconds. Limited to this machine, ROS adds that
-# transport whatever FASTDDS_BUILTIN_TRANSPORTS says; only a profile keeps data away from it.
+# A killed process keeps its locks in the shared memory of Fast DDS, and its peers then block for
+# seconds. With discovery limited to localhost, ROS adds that transport regardless of
+# FASTDDS_BUILTIN_TRANSPORTS; only a profile excludes it.
 if "FASTDDS_DEFAULT_PROFILES_FILE" not in os.environ:
     os.environ.setdefault("FASTRTPS_DEFAULT_PROFILES_FILE", str(Path(__file__).parent / "udp.xml"))
 
-# Module of each program, below this package; setup.py names the same entry points.
+# Module of each program, relative to this package; setup.py has the same entry points.
 PROGRAMS = {
     "robot_team": "team.robot_team",
     "haptic_emulator": "sources.haptic_emulator",

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start a program by its name: `python -m noninteract_ros.nodes NAME --ros-args ...`."""
+"""Command `python -m noninteract_ros.nodes NAME --ros-args ...`."""
 
 import sys
 from importlib import import_module
@@ -9,7 +9,11 @@ from noninteract_ros.nodes import PROGRAMS
 
 
 def main() -> int:
-    """Run the program that the first argument names; return its exit status, 2 for no such."""
+    """Run the program named by the first argument.
+
+    Returns:
+        Exit status of the program; 2 if there is no program of that name.
+    """
     name = sys.argv[1] if len(sys.argv) > 1 else ""
     if name not in PROGRAMS:
         print(f"program: found {name!r}; allowed: {one_of(PROGRAMS, name)}", file=sys.stderr)

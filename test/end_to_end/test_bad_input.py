@@ -154,7 +154,7 @@ class Pest:
 
     def refused(self) -> int:
         values = self._stack.ear.status.get(self._node, (0, "", {}))[2]
-        return int(values.get(f"refused on {self._topic}", 0))
+        return int(values.get(f"rejected on {self._topic}", 0))
 
     def annoy(self, message: Any, reason: str) -> None:
         """Publishes what must be refused for a reason, and waits until the node says so."""
@@ -164,7 +164,7 @@ class Pest:
         def said() -> bool:
             self._stack.nodes[self._node].publish_diagnostics()
             values = self._stack.ear.status.get(self._node, (0, "", {}))[2]
-            last = values.get("last refusal", "")
+            last = values.get("last rejection", "")
             named = last.startswith(f"{self._topic}: ") and re.search(reason, last)
             return self.refused() > before and bool(named)
 

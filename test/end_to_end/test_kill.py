@@ -14,9 +14,9 @@ NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
 RATE = 100.0
 
 WITHOUT_TEAM = {
-    "controller": "holding: no states of the team",
-    "haptic_emulator": "no states of the team",
-    "relative_planner": "no states of the team",
+    "controller": "holding: no states from the team",
+    "haptic_emulator": "no states from the team",
+    "relative_planner": "no states from the team",
 }
 # Killed program: who says what about it, in lockstep and in wall time.
 NOTICES = {
@@ -30,7 +30,7 @@ NOTICES = {
     },
     "controller": {
         True: {"robot_team": "waiting for the command that answers the state"},
-        False: {"robot_team": "braking: no fresh command"},
+        False: {"robot_team": "braking: command timeout"},
     },
     "robot_team": {True: WITHOUT_TEAM, False: WITHOUT_TEAM},
 }

@@ -67,7 +67,7 @@ def test_in_wall_time_they_reach_and_hold_a_place(ros: Ros, programs: Programs) 
     programs.start_all(NAMES, values, ear)
     until(lambda: np.abs(middle() - [0.0, 0.5]).max() < 0.01, "the place")
     programs.kill("controller")
-    until(ear.says("robot_team", "braking: no fresh command"), "the team brakes")
+    until(ear.says("robot_team", "braking: command timeout"), "the team brakes")
 
 
 def test_a_controller_that_is_ended_brakes_the_team_first(ros: Ros, programs: Programs) -> None:
@@ -110,6 +110,6 @@ def test_arrays_that_answer_nothing_do_not_move_a_lockstep_team(ros: Ros, label:
         message = Float64MultiArray(data=[0.0, 0.0])
         message.layout.dim = [MultiArrayDimension(label=label, size=2, stride=2)]
         publisher.publish(message)
-    expected = "answers no state" if label else "must say what it answers"
-    until(lambda: expected in ear.value("robot_team", "last refusal"), "the refusal")
+    expected = "answers no state" if label else "no stamp of the answered state"
+    until(lambda: expected in ear.value("robot_team", "last rejection"), "the refusal")
     assert team._simulation.tick == 0

@@ -31,7 +31,7 @@ SOON = 1.5  # [s] many heartbeats, and half of what one takes by default
 class Writer(Node):
     """Speaks without a pause, and leaves soon."""
 
-    has_last_words = False
+    handles_shutdown = False
 
     def __init__(self) -> None:
         super().__init__("writer")

@@ -53,7 +53,7 @@ def test_an_unknown_source_is_refused_and_changes_nothing(ros: Ros) -> None:
     stack.begin()
     talker.publish(String(data="robot"))
     until(
-        lambda: "human | autonomy | hold" in stack.ear.value("controller", "last refusal"),
+        lambda: "human | autonomy | hold" in stack.ear.value("controller", "last rejection"),
         "the refusal",
     )
     assert in_force(ros) == "autonomy"

@@ -292,4 +292,4 @@ def test_without_states_the_controller_is_silent(ros: Ros, lockstep: bool) -> No
     text = "waiting for the first state of the team"
     until(ear.says("controller", text), text)
     assert not ear.commands
-    assert ear.value("controller", "refused inputs") == ""
+    assert ear.value("controller", "rejected inputs") == ""

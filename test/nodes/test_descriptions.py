@@ -86,7 +86,13 @@ def test_a_controller_waits_says_so_refuses_and_goes_on(ros: Ros, say: Any) -> N
         ),
     ):
         say("left", text)
-        until(ear.says("controller", f"refused: found {expected}"), expected)
+        until(
+            ear.says(
+                "controller",
+                f"rejected the description of left on /left/robot_description: found {expected}",
+            ),
+            expected,
+        )
         assert ear.status["controller"][0] == 2
     say("left", TEXTS["left"])
     until(controller.made, "the controller")
@@ -122,7 +128,7 @@ def test_the_same_again_is_no_news_and_another_one_stops(
     assert "changed" not in ear.status["controller"][1]
     say("left", TEXTS["left"].replace("1.0", "2.0"))
     for name in ("controller", "robot_team"):
-        until(ear.says(name, "the description of left has changed: restart"), name)
+        until(ear.says(name, "the description of left has changed; restart the node"), name)
         assert ear.status[name][0] == 2
     say("left", TEXTS["left"])
     until(ear.renewed("controller"))

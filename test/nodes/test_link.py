@@ -36,7 +36,7 @@ def runs_as_rehearsed(ros: Ros, found: dict[str, Any], end: float) -> dict[float
 
     ros.probe.create_subscription(Float64MultiArray, "cooperative/link", note, 1000)
     stack = ros.stack(found)
-    ros.matched(stack.nodes["haptic_emulator"]._account_to)
+    ros.matched(stack.nodes["haptic_emulator"]._account_publisher)
     stack.begin()
     until(stack.ear.says("robot_team", "finished"), "the end of the run")
     rehearsal = Rehearsal(Scenario.from_dict(stack.values))

@@ -26,7 +26,7 @@ NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
 # One process tries all command lines: the programs' main function returns the exit status.
 TRIES = """
 import contextlib, io, json, sys
-from noninteract_ros.nodes.controller import main
+from noninteract_ros.nodes.controller.controller import main
 
 for line in sys.stdin:
     said = io.StringIO()

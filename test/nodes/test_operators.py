@@ -77,7 +77,7 @@ class Bench:
     def rests(self) -> None:
         """Waits until the device is let go, the last words are said, and the team rests."""
         until(lambda: self.speed() < 1e-3, "rest")
-        until(lambda: self.node._words == 0, "the last words")
+        until(lambda: self.node._releases_left == 0, "the last words")
         count = len(self.said)
         until(self.ear.renewed(self.node.get_name()))
         assert len(self.said) <= count + 1  # One may have been on its way.
@@ -159,7 +159,7 @@ def test_a_bad_message_is_refused_and_moves_nothing(ros: Ros) -> None:
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.matched(driver)
     driver.publish(joy([1.0, 1.0], (ENABLE,)))
-    until(lambda: "needs 4" in bench.ear.value("joy_operator", "last refusal"), "the refusal")
+    until(lambda: "needs 4" in bench.ear.value("joy_operator", "last rejection"), "the refusal")
     assert not bench.said
 
 
@@ -216,7 +216,7 @@ def test_a_tracker_that_jumps_lets_go(ros: Ros) -> None:
     clutch.publish(Bool(data=True))
     bench.publish(driver, pose(0.0, 0.0), 100.0, lambda: len(bench.said) > 5)
     start = bench.place()
-    bench.publish(driver, pose(0.5, 0.0), 100.0, lambda: bench.node._refused)
+    bench.publish(driver, pose(0.5, 0.0), 100.0, lambda: bench.node._rejected)
     for _ in range(20):
         driver.publish(pose(0.5, 0.0))
         time.sleep(0.01)
@@ -247,7 +247,7 @@ def test_a_button_is_a_clutch_whose_silence_lets_go(ros: Ros) -> None:
 
     held(0.0, lambda: len(bench.said) > 10)
     held(5e-3, lambda: abs(bench.place()[0] - start[0] - 0.06) < 3e-3)
-    bench.publish(driver, pose(3.06, 3.0), 100.0, lambda: bench.node._words == 0)
+    bench.publish(driver, pose(3.06, 3.0), 100.0, lambda: bench.node._releases_left == 0)
     count = len(bench.said)
     gamepad.publish(joy(REST, (2,)))  # Back, and still pressed: it has to be pressed anew.
     bench.publish(driver, pose(3.06, 3.0), 100.0, bench.ear.renewed("pose_operator"))

@@ -168,8 +168,8 @@ def test_what_cannot_be_recorded_is_said_in_one_line(
 
 FULL_DISK = """
 import resource, sys
-from noninteract_ros.nodes.descriptions import LATCHED_QOS
-from noninteract_ros.nodes.recorder import main
+from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
+from noninteract_ros.nodes.recording.recorder import main
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
 sys.exit(main())

@@ -64,8 +64,8 @@ def test_each_command_is_one_tick(ros: Ros) -> None:
     masses = np.array([1.0, 1.0, 2.0, 2.0])
     np.testing.assert_allclose(v[2], 2 * 0.001 * np.array(force) / masses, rtol=1e-12)
     np.testing.assert_array_equal(effort, [[0.0] * 4, force, force])
-    until(lambda: bench.ear.value("robot_team", "refused inputs") == "1", "the refusal")
-    assert "answers no state" in bench.ear.value("robot_team", "last refusal")
+    until(lambda: bench.ear.value("robot_team", "rejected inputs") == "1", "the refusal")
+    assert "answers no state" in bench.ear.value("robot_team", "last rejection")
 
 
 def test_an_unanswered_state_is_sent_again(ros: Ros) -> None:
@@ -156,14 +156,14 @@ def test_without_commands_the_team_brakes_in_wall_time(ros: Ros) -> None:
         return speed() > 0.1
 
     until(push_on, "the team moves")
-    bench.says("braking: no fresh command")
+    bench.says("braking: command timeout")
     until(lambda: speed() < 1e-3, "the team is at rest")
     _, _, v, effort = bench.ear.history(dict(bench.ear.states))
     braking = slice(-10, None)
     np.testing.assert_allclose(effort[braking][1:], -20.0 * v[braking][:-1], rtol=1e-9)
     until(push_on, "the team moves again")
     bench.publish(1, [3.0] * 4)
-    until(lambda: "goes back" in bench.ear.value("robot_team", "last refusal"))
+    until(lambda: "goes back" in bench.ear.value("robot_team", "last rejection"))
 
 
 def test_descriptions_are_there_for_whoever_comes_later(ros: Ros) -> None:

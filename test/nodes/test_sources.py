@@ -110,10 +110,10 @@ def test_a_team_that_starts_anew_is_spoken_to_from_the_start(ros: Ros) -> None:
         return len(bench.said) >= 2
 
     def refusal() -> bool:
-        return "goes back" in bench.ear.value("relative_planner", "last refusal")
+        return "goes back" in bench.ear.value("relative_planner", "last rejection")
 
     until(refusal, "the refusal")
-    until(bench.ear.says("relative_planner", "no states of the team"), "the silence is noticed")
+    until(bench.ear.says("relative_planner", "no states from the team"), "the silence is noticed")
     until(begins_anew, "a new start")
     assert bench.stamps()[:2] == [reference(0), marker(9)]
 
@@ -134,7 +134,7 @@ def test_in_wall_time_a_source_speaks_while_the_team_is_there(ros: Ros) -> None:
         return len(bench.said) >= 30
 
     until(team, "30 references")
-    until(bench.ear.says("haptic_emulator", "no states of the team"), "the silence is noticed")
+    until(bench.ear.says("haptic_emulator", "no states from the team"), "the silence is noticed")
     count = len(bench.said)
     until(bench.ear.renewed("haptic_emulator"))
     assert len(bench.said) == count

@@ -57,7 +57,7 @@ def test_a_team_that_is_gone_is_an_error_though_it_was_paused(ros: Ros, stack: S
     pause(ros)
     says(stack, WARN, "waiting: the team is paused")
     ros.remove(stack.nodes["robot_team"])
-    says(stack, ERROR, "holding: no states of the team", older=1.0)
+    says(stack, ERROR, "holding: no states from the team", older=1.0)
 
 
 def test_a_team_that_has_finished_is_no_error(ros: Ros) -> None:

@@ -15,7 +15,7 @@ from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from waiting import until
 
-from noninteract_ros.nodes.controller.team_energy import LABELS, unsound
+from noninteract_ros.nodes.controller.telemetry import ACCOUNT_LABELS, imbalance_text
 
 
 def door(**changes: Any) -> dict[str, Any]:
@@ -34,7 +34,7 @@ class Accounts:
     def _take(self, data: bytes) -> None:
         message = deserialize_message(data, Float64MultiArray)
         labels = [dim.label for dim in message.layout.dim]
-        assert tuple(labels) == LABELS
+        assert tuple(labels) == ACCOUNT_LABELS
         self.rows.append(dict(zip(labels, message.data, strict=True)))
 
 
@@ -64,9 +64,9 @@ def test_an_account_that_does_not_balance_is_said_to(ros: Ros) -> None:
     stack.run_until(0.2)
     core = stack.nodes["controller"].core
     account = core.gate.account
-    assert unsound(account) == ""
+    assert imbalance_text(account) == ""
     forged = replace(account, start=account.start - 0.01)
-    assert unsound(forged).startswith("the energy account does not balance: 0.0")
+    assert imbalance_text(forged).startswith("the energy account does not balance: 0.0")
     core.gate._account = replace(core.gate.account, start=-1.0)
     until(stack.ear.says("controller", "does not balance"), "the error")
     assert stack.ear.status["controller"][0] == 2

@@ -251,8 +251,12 @@ def test_diagnostics_are_summed_up(tmp_path: Path) -> None:
 
     def tell(writer: RunWriter) -> None:
         said = [
-            (Level.WARN, "/team/robot_team", {"refused inputs": 2, "last refusal": "push: NaN"}),
-            (Level.OK, "/team/robot_team", {"refused inputs": 3}),
+            (
+                Level.WARN,
+                "/team/robot_team",
+                {"rejected inputs": 2, "last rejection": "push: NaN"},
+            ),
+            (Level.OK, "/team/robot_team", {"rejected inputs": 3}),
             (Level.WARN, "/team/recorder", {"lost": 4}),
         ]
         for level, name, values in said:

@@ -22,7 +22,7 @@ from noninteract_ros.nodes.bench.programs import (
     ros,
     tick_times,
 )
-from noninteract_ros.nodes.common.node import Ticker
+from noninteract_ros.nodes.common.node import WallRate
 from noninteract_ros.nodes.common.parameter_files import rewrite, write
 from noninteract_ros.nodes.controller.controller import Controller
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
@@ -217,9 +217,9 @@ def wall_rows(name: str, values: Mapping[str, Any], settings: BenchSettings) -> 
 
 
 def _sleeps(rate: float, duration: float) -> list[int]:
-    ticker, instants = Ticker(rate), []
+    wall_rate, instants = WallRate(rate), []
     for _ in range(round(rate * duration)):
-        ticker.wait()
+        wall_rate.sleep()
         instants.append(time.time_ns())
     return instants
 

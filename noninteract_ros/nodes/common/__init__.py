@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Base class, program start, QoS and time checks that all programs share."""
+"""Base node, program startup, QoS and stamp checks shared by all programs."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who has spoken for which tick, and in which order."""
+"""Lockstep sources and the order of stamps."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -9,49 +9,55 @@ from noninteract_ros.control.references.inputs import HORIZON
 from noninteract_ros.control.references.subtask_input import SubtaskInput
 from noninteract_ros.errors import InputError
 
-START_TIMEOUT = 30.0  # [s] wall time given to a source that has never spoken
-RESTART_SILENCE = 1.0  # [s] wall time after which a stamp that goes back means a restart
+START_TIMEOUT = 30.0  # [s] wall time to wait for the first input of a source
+RESTART_SILENCE = 1.0  # [s] wall time without messages after which an earlier stamp is a restart
 
 
-class SourceWatch:
-    """Tells which lockstep sources a tick still waits for.
+class LockstepSources:
+    """Sources whose input each lockstep tick waits for.
 
     Args:
         names: Sources as `<subtask>/<source>`.
-        inputs: The subtasks' inputs.
-        timeout: Wall time after which a source that does not speak is given up [s].
+        inputs: Inputs by subtask.
+        timeout: Wall time after which a tick no longer waits for a source [s].
 
     Attributes:
-        absent: Sources that were given up; they return by speaking.
+        absent: Sources that have timed out. A source returns with its next input.
     """
 
     def __init__(
         self, names: Sequence[str], inputs: Mapping[str, SubtaskInput], timeout: float
     ) -> None:
         self._names, self._inputs, self._timeout = tuple(names), inputs, timeout
-        self._passed_over: set[str] = set()
+        self._skipped: set[str] = set()
         self.absent: set[str] = set()
 
-    def begins_ahead(self, name: str, when: float, now: float) -> bool:
-        """Whether the first word of a source, for `when` [s], is for a later tick than `now` [s].
+    def starts_late(self, name: str, stamp: float, now: float) -> bool:
+        """Return True if the first input of a source is for a later tick than the current one.
 
-        What it said for this tick was lost then, as messages are before both ends know of each
-        other. It says everything again when the team sends its state again; then it is believed.
+        The input for the current tick was then lost, as messages are until publisher and
+        subscription are matched. The source publishes all of it again when the team sends its
+        state again, so only the first such input is skipped.
+
+        Args:
+            name: Source as `<subtask>/<source>`.
+            stamp: Stamp of the input [s].
+            now: Time of the team [s].
         """
         subtask, source = name.split("/")
-        heard = self._inputs[subtask].sources[source].complete_until > -float("inf")
-        if heard or when <= now + 1e-9 or name not in self._names or name in self._passed_over:
-            self._passed_over.discard(name)
+        received = self._inputs[subtask].sources[source].complete_until > -float("inf")
+        if received or stamp <= now + 1e-9 or name not in self._names or name in self._skipped:
+            self._skipped.discard(name)
             return False
-        self._passed_over.add(name)
+        self._skipped.add(name)
         return True
 
     def missing(self, now: float, waiting_since: float) -> list[str]:
-        """Sources that have not spoken for the tick at `now` [s] and are still waited for.
+        """Return the sources whose input for the tick at `now` is still awaited.
 
         Args:
-            now: The team's time [s].
-            waiting_since: When the tick's state came, by the monotonic clock [s].
+            now: Time of the team [s].
+            waiting_since: Monotonic time at which the state of the tick was received [s].
         """
         missing = []
         for name in self._names:
@@ -68,29 +74,33 @@ class SourceWatch:
         return missing
 
 
-class StampOrder:
-    """Refuses stamps that go back or run ahead, topic by topic; after a silence all may be new."""
+class StampChecker:
+    """Order of stamps per topic.
+
+    Rejects stamps that go back or run ahead. After `RESTART_SILENCE` without messages on a topic,
+    any stamp is accepted.
+    """
 
     def __init__(self) -> None:
         self._last: dict[str, tuple[int, float]] = {}
 
     def last(self, topic: str) -> int:
-        """Newest stamp that was taken on a topic [ns]; -1, if none was."""
+        """Return the newest accepted stamp of a topic [ns], or -1 if there is none."""
         return self._last.get(topic, (-1, 0.0))[0]
 
     def check(self, topic: str, stamp: int, lead: float = float("inf")) -> bool:
-        """Compares a stamp [ns] with the one before it.
+        """Check a stamp against the last accepted one.
 
         Args:
-            topic: Where it came.
-            stamp: The stamp [ns].
-            lead: By how much more than wall time it may have grown [s].
+            topic: Topic of the message.
+            stamp: Stamp [ns].
+            lead: Maximum growth of the stamp beyond the elapsed wall time [s].
 
         Returns:
-            Whether the topic starts anew with an earlier stamp.
+            True if the topic has restarted with an earlier stamp.
 
         Raises:
-            InputError: The stamp goes back or runs ahead, without a silence before it.
+            InputError: The stamp goes back or runs ahead without a silence before it.
         """
         if topic not in self._last:
             return False
@@ -106,21 +116,21 @@ class StampOrder:
             raise InputError(text)
         return False
 
-    def note(self, topic: str, stamp: int) -> None:
-        """Keeps the stamp [ns] of a message that was taken."""
+    def record(self, topic: str, stamp: int) -> None:
+        """Record the stamp [ns] of an accepted message."""
         self._last[topic] = (stamp, time.monotonic())
 
-    def take(self, topic: str, stamp: int, lead: float = float("inf")) -> bool:
-        """Checks and keeps a stamp; see `check`."""
-        anew = self.check(topic, stamp, lead)
-        self.note(topic, stamp)
-        return anew
+    def accept(self, topic: str, stamp: int, lead: float = float("inf")) -> bool:
+        """Check a stamp and record it; see `check`."""
+        restarted = self.check(topic, stamp, lead)
+        self.record(topic, stamp)
+        return restarted
 
-    def forget(self) -> None:
-        """Starts anew on every topic."""
+    def reset(self) -> None:
+        """Discard the stamps of all topics."""
         self._last.clear()
 
 
-def state_lead(rate: float) -> float:
-    """By how much the stamps of a team with this rate [Hz] may run ahead of wall time [s]."""
+def max_stamp_lead(rate: float) -> float:
+    """Return how far stamps of a team with this rate [Hz] may run ahead of wall time [s]."""
     return max(HORIZON, 2.0 / rate)

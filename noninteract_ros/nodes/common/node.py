@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every program shares: the scenario as parameters, diagnostics, refusals, its threads."""
+"""Base class of the nodes: scenario parameters, diagnostics, input rejection and threads."""
 
 import threading
 import time
@@ -18,19 +18,19 @@ from rclpy.qos import QoSProfile
 from rclpy.task import Future
 
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.common.descriptions import Descriptions
+from noninteract_ros.nodes.common.descriptions import RobotDescriptions
 from noninteract_ros.nodes.common.program import until_shutdown
 from noninteract_ros.nodes.messages.messages import Level, to_diagnostics, to_status
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.files import nest
 
 NAMESPACE = "team"
-# Reliable, and so deep that a reader who is kept waiting, as a recorder may be, misses no tick.
+# Reliable, and deep enough that a subscriber that is blocked for a while misses no tick.
 LOOP_QOS = QoSProfile(depth=1000)
 DIAGNOSTICS_PERIOD = 0.5
-STEADY = Clock(clock_type=ClockType.STEADY_TIME)
+STEADY_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LOG_PERIOD = 2.0
-JOIN_TIMEOUT = 1.0  # [s] given to a callback that runs when the program ends
+JOIN_TIMEOUT = 1.0  # [s] to wait on shutdown for a callback that is still running
 EMPTY_TYPES = {
     tuple[float, ...]: Parameter.Type.DOUBLE_ARRAY,
     tuple[str, ...]: Parameter.Type.STRING_ARRAY,
@@ -38,24 +38,24 @@ EMPTY_TYPES = {
 
 
 class ScenarioNode(Node):
-    """A node that is started with a scenario.
+    """Node whose parameters are the keys of a scenario.
 
-    All keys of the scenario become its parameters; they are read-only but for the live ones of a
-    node that sets `LIVE`.
+    Parameters are read-only, except for the live ones of a node that sets `LIVE`.
 
     Args:
         name: Name of the node.
-        kwargs: Passed on to `rclpy.node.Node`.
+        kwargs: Arguments of `rclpy.node.Node`.
 
     Raises:
-        ScenarioError: The parameters are no valid scenario.
+        ScenarioError: The parameters are not a valid scenario.
 
     Attributes:
-        values: The scenario, nested.
-        scenario: The scenario, checked.
-        lockstep: Whether the team waits for its commands.
-        descriptions: URDFs that came on topics.
-        told_to_stop: Whether the program was, asked by a loop with last words.
+        values: Nested values of the scenario.
+        scenario: Checked scenario.
+        lockstep: True where each tick waits for the command that answers its state.
+        descriptions: Robot descriptions received on topics.
+        shutdown_requested: Return True after SIGINT or SIGTERM; for loops of nodes that handle
+            their own shutdown.
     """
 
     LIVE = False
@@ -64,20 +64,20 @@ class ScenarioNode(Node):
         kwargs.setdefault("namespace", NAMESPACE)
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         given = {key: item.value for key, item in self.get_parameters_by_prefix("").items()}
-        self._diagnostics = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
-        self.descriptions = Descriptions(self, nest(given), self.on_description_changed)
-        # Nothing of a node can be built before the robots are known, so it is waited here.
-        self.told_to_stop: Callable[[], bool] = lambda: False
-        self._refused: Counter[str] = Counter()
-        self._last_refusal = "none"
-        self.values = self.descriptions.wait(self._tell_of_waiting)
+        self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
+        self.descriptions = RobotDescriptions(self, nest(given), self.on_description_changed)
+        self.shutdown_requested: Callable[[], bool] = lambda: False
+        self._rejected: Counter[str] = Counter()
+        self._last_rejection = "none"
+        # Nothing of a node can be built before its robots are known.
+        self.values = self.descriptions.wait(self._report_waiting)
         self.scenario = Scenario.from_dict(self.values)
-        self._declare()
+        self._declare_parameters()
         self.lockstep = self.scenario.general.lockstep
-        self.every(DIAGNOSTICS_PERIOD, self.publish_diagnostics)
+        self.create_wall_timer(DIAGNOSTICS_PERIOD, self.publish_diagnostics)
 
-    def _declare(self) -> None:
-        """Declares every key of the scenario: typed, described, read-only unless live here."""
+    def _declare_parameters(self) -> None:
+        """Declare every key of the scenario with type, description and read-only flag."""
         for name, hint, rule, value in self.scenario.parameters():
             if self.has_parameter(name):
                 self.undeclare_parameter(name)
@@ -85,92 +85,101 @@ class ScenarioNode(Node):
                 description=rule.doc,
                 additional_constraints=" | ".join(rule.choices) or rule.numbers_allowed(),
                 read_only=not (rule.live and self.LIVE),
-                # What changes live is checked by the rule, which says more than ROS does.
+                # The rule checks live changes with a better error text than ROS.
                 dynamic_typing=rule.live and self.LIVE,
             )
-            # An empty list has no type of its own: it is declared, but left unset.
+            # An empty list has no type, so it is declared but left unset.
             empty = None if descriptor.dynamic_typing else EMPTY_TYPES.get(hint)
             typed = empty if value == () else _plain(value)
             self.declare_parameter(name, typed, descriptor, ignore_override=True)
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
-        """Level, one line and values for `/diagnostics`."""
+        """Return level, message and values for `/diagnostics`."""
         raise NotImplementedError
 
     def publish_diagnostics(self) -> None:
-        """Says how the node is."""
+        """Publish the status of the node."""
         level, text, values = self.status()
         if problem := self.descriptions.problem:
             level, text = Level.ERROR, text if problem in text else f"{problem}; {text}"
-        self._tell(level, text, values)
+        self._publish_status(level, text, values)
 
     def on_description_changed(self) -> None:
-        """A robot's description is another one than that which the node was built from."""
+        """React to a robot description that differs from the one the node was built from."""
 
-    def _tell_of_waiting(self, text: str, refused: bool) -> None:
-        self._tell(Level.ERROR if refused else Level.WARN, text, {})
+    def _report_waiting(self, text: str, rejected: bool) -> None:
+        self._publish_status(Level.ERROR if rejected else Level.WARN, text, {})
 
-    def _tell(self, level: Level, text: str, values: dict[str, object]) -> None:
+    def _publish_status(self, level: Level, text: str, values: dict[str, object]) -> None:
         matched = [(item.topic_name, item.get_subscription_count()) for item in self.publishers]
         values["subscribers"] = ", ".join(f"{topic} {count}" for topic, count in matched)
-        if refused := dict(self._refused):  # The loop may refuse something meanwhile.
-            values["refused inputs"] = sum(refused.values())
-            values["last refusal"] = self._last_refusal
-            values |= {f"refused on {topic}": count for topic, count in refused.items()}
+        if rejected := dict(self._rejected):  # A copy, since the loop may reject inputs meanwhile.
+            values["rejected inputs"] = sum(rejected.values())
+            values["last rejection"] = self._last_rejection
+            values |= {f"rejected on {topic}": count for topic, count in rejected.items()}
         status = to_status(self.get_fully_qualified_name(), level, text, values)
         now = self.get_clock().now().nanoseconds
-        self._diagnostics.publish(to_diagnostics(now, [status]))
+        self._diagnostics_publisher.publish(to_diagnostics(now, [status]))
 
     def subscribe(
         self,
-        kind: type,
+        message_type: type,
         topic: str,
-        take: Callable[[Any], None],
+        callback: Callable[[Any], None],
         *,
         raw: bool = False,
         qos: QoSProfile = LOOP_QOS,
     ) -> None:
-        """Subscribes; what `take` refuses with an InputError is counted, named and dropped."""
+        """Subscribe to a topic; reject messages for which the callback raises an InputError.
+
+        Args:
+            message_type: Message type.
+            topic: Topic name.
+            callback: Called with each message; with serialized bytes if `raw`.
+            raw: True to skip deserialization.
+            qos: Quality of service.
+        """
 
         def checked(message: Any) -> None:
             with until_shutdown(self.context):
                 try:
-                    take(message)
+                    callback(message)
                 except InputError as error:
-                    self.refuse(topic, str(error))
+                    self.reject_input(topic, str(error))
 
-        self.create_subscription(kind, topic, checked, qos, raw=raw)
+        self.create_subscription(message_type, topic, checked, qos, raw=raw)
 
-    def every(self, period: float, work: Callable[[], None]) -> None:
-        """Has something done again and again, each period [s] of wall time."""
+    def create_wall_timer(self, period: float, callback: Callable[[], None]) -> None:
+        """Create a timer with a period [s] of wall time, whatever clock the node uses."""
 
         def guarded() -> None:
             with until_shutdown(self.context):
-                work()
+                callback()
 
-        self.create_timer(period, guarded, clock=STEADY)
+        self.create_timer(period, guarded, clock=STEADY_CLOCK)
 
-    def refuse(self, topic: str, reason: str) -> None:
-        """Counts and names an input that is refused whole."""
-        self._refused[topic] += 1
-        self._last_refusal = f"{topic}: {reason}"
-        self.get_logger().warning(f"refused {topic}: {reason}", throttle_duration_sec=LOG_PERIOD)
+    def reject_input(self, topic: str, reason: str) -> None:
+        """Count and log a rejected input."""
+        self._rejected[topic] += 1
+        self._last_rejection = f"{topic}: {reason}"
+        text = f"rejected input on {topic}: {reason}"
+        self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
 
     @property
     def has_loop(self) -> bool:
-        """Whether the main thread has a loop of its own; in lockstep callbacks do everything."""
+        """True where the main thread runs `loop`; in lockstep the callbacks do all work."""
         return not self.lockstep
 
     def loop(self) -> None:
-        """What the main thread does where it has a loop."""
+        """Run the main thread of a node that has a loop."""
 
     @property
-    def has_last_words(self) -> bool:
-        """Whether the loop has something to say after it was told to stop."""
+    def handles_shutdown(self) -> bool:
+        """True where the loop still publishes after SIGINT or SIGTERM and then returns."""
         return False
 
     def run(self) -> None:
-        """Runs until the context is shut down; with last words, until it is told to stop."""
+        """Run until the context is shut down, or until a loop that handles shutdown returns."""
         executor = EventsExecutor(context=self.context)
         executor.add_node(self)
         if self.has_loop:
@@ -179,7 +188,7 @@ class ScenarioNode(Node):
             spin(executor, self.context)
 
     def _run_loop(self, executor: EventsExecutor) -> None:
-        """The loop here and the callbacks beside it; where one of them fails, both end."""
+        """Run the loop in this thread and the callbacks in another; a failure ends both."""
         failures: list[Exception] = []
 
         def serve() -> None:
@@ -206,7 +215,7 @@ def _plain(value: Any) -> Any:
 
 
 def spin(executor: EventsExecutor, context: rclpy.Context) -> None:
-    """Spins until the context is shut down.
+    """Spin until the context is shut down.
 
     `EventsExecutor.spin` without a time-out busy-loops in the PyPI wheels; this form does not.
     """
@@ -215,16 +224,20 @@ def spin(executor: EventsExecutor, context: rclpy.Context) -> None:
             executor.spin_until_future_complete(Future(), 3600.0)
 
 
-class Ticker:
-    """Absolute sleeping at a rate; periods that were missed are skipped, not made up for."""
+class WallRate:
+    """Rate in wall time [Hz]. Missed periods are skipped.
+
+    Attributes:
+        missed: Number of missed periods.
+    """
 
     def __init__(self, rate: float) -> None:
         self._period = 1.0 / rate
         self._next = time.monotonic()
         self.missed = 0
 
-    def wait(self) -> None:
-        """Sleeps until the next period begins."""
+    def sleep(self) -> None:
+        """Sleep until the next period begins."""
         self._next += self._period
         now = time.monotonic()
         if self._next > now:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Parameter files, read before ROS reads them.
+"""Parameter files, checked and rewritten before ROS parses them.
 
-What is wrong is said in one clear line, and two traps of ROS's own reader are taken away: there
-`y` is a boolean, so that `axes: [x, y]` is refused, and `[0, 1.5]` is a list of unlike items.
+Errors are reported in one line. Two pitfalls of the parser of ROS are removed: it takes `y` for a
+boolean, which rejects `axes: [x, y]`, and `[0, 1.5]` for a list of mixed types.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -22,7 +22,7 @@ EVERY_NODE = "/**"
 
 
 class _Quoted(yaml.SafeDumper):
-    """Writes every text in quotes, so that no reader takes it for anything else."""
+    """YAML dumper that quotes every string, so that no parser takes it for another type."""
 
 
 _Quoted.add_representer(
@@ -31,26 +31,26 @@ _Quoted.add_representer(
 
 
 def files_of(arguments: Sequence[str]) -> list[str]:
-    """Files that a ROS command line names after `--params-file`."""
+    """Return the files named by `--params-file` on a ROS command line."""
     return [value for option, value in pairwise(arguments) if option == OPTION]
 
 
 def rewrite(arguments: Sequence[str], folder: Path) -> list[str]:
-    """The same command line with parameters that ROS reads as they are meant.
+    """Return the command line with its parameters rewritten for the parser of ROS.
 
     Args:
-        arguments: A ROS command line.
-        folder: Where the rewritten files are put.
+        arguments: ROS command line.
+        folder: Folder for the rewritten files.
 
     Raises:
-        ScenarioError: A file is missing, is no YAML, is no parameter file, or a list has unlike
-            items; the error names the file and the key.
+        ScenarioError: A file is missing, is not YAML, is not a parameter file, or a list has mixed
+            types. The error names file and key.
     """
     result = list(arguments)
     given: set[tuple[str, str]] = set()
     for place in reversed(range(1, len(result))):
         if result[place - 1] == OPTION:
-            content = _without(_checked(result[place]), given)
+            content = _drop_overridden(_checked(result[place]), given)
             result[place] = str(folder / f"{place}.yaml")
             Path(result[place]).write_text(dump(content))
         elif result[place - 1] in OVERRIDES:
@@ -59,10 +59,10 @@ def rewrite(arguments: Sequence[str], folder: Path) -> list[str]:
     return result
 
 
-def _without(block: Mapping[str, Any], given: set[tuple[str, str]], node: str = "") -> Any:
-    """What a file gives nodes, but for the keys that are given again later; adds its own to them.
+def _drop_overridden(block: Mapping[str, Any], given: set[tuple[str, str]], node: str = "") -> Any:
+    """Return a parameter file without the keys in `given`, and add its own keys to `given`.
 
-    ROS keeps values of both types where the later one has another type, and may use the first.
+    Where a later value has another type, ROS keeps both and may use the first.
     """
     kept: dict[str, Any] = {}
     for name, value in block.items():
@@ -71,17 +71,17 @@ def _without(block: Mapping[str, Any], given: set[tuple[str, str]], node: str = 
             given.update((node, key) for key in leaves)
             kept[name] = leaves
         else:
-            kept[name] = _without(value, given, f"{node}/{name}".replace("//", "/"))
+            kept[name] = _drop_overridden(value, given, f"{node}/{name}".replace("//", "/"))
     return kept
 
 
 def _rewrite_override(text: str) -> str:
-    """`key:=value` with a list that ROS reads as it is meant."""
+    """Return `key:=value` with a list value rewritten for the parser of ROS."""
     key, separator, written = text.partition(":=")
     try:
         value = yaml.safe_load(written)
     except yaml.YAMLError:
-        return text  # ROS says what is wrong with it.
+        return text  # ROS reports the error.
     if not isinstance(value, list):
         return text
     _check_leaf(key, value, COMMAND_LINE)
@@ -90,20 +90,20 @@ def _rewrite_override(text: str) -> str:
 
 
 def dump(content: Mapping[str, Any]) -> str:
-    """A parameter file's text that ROS reads as it is meant."""
+    """Return the text of a parameter file for the parser of ROS."""
     return yaml.dump(_plain(content), Dumper=_Quoted, sort_keys=False)
 
 
 def write(file: Path, values: Mapping[str, Any]) -> Path:
-    """Writes a scenario's values as a file that programs are started with."""
+    """Write the values of a scenario as a parameter file."""
     file.write_text(dump({EVERY_NODE: {"ros__parameters": dict(values)}}))
     return file
 
 
 def origin_of_key(arguments: Sequence[str], key: str) -> str | None:
-    """What gives a key on a command line: an override, the last file that holds its block.
+    """Return the origin of a key on a command line: an override, or a file.
 
-    The last file, where none does; None, where there is no file.
+    The file is the last one with the block of the key, else the last one. None without files.
     """
     for option, text in pairwise(arguments):
         if option in OVERRIDES and text.partition(":=")[0].rpartition(":")[2] == key:
@@ -128,7 +128,7 @@ def _checked(path: str) -> Mapping[str, Any]:
 
 
 def _check_node(name: str, block: Any, path: str) -> None:
-    """Refuses values that stand beside `ros__parameters` instead of in it."""
+    """Raise a ScenarioError for values beside `ros__parameters` instead of inside it."""
     if not isinstance(block, Mapping):
         raise ScenarioError(name, repr(block), "a block with ros__parameters", path)
     for key, value in block.items():
@@ -139,7 +139,7 @@ def _check_node(name: str, block: Any, path: str) -> None:
 
 
 def _leaves(block: Mapping[Any, Any], path: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted keys below `ros__parameters`, with their values."""
+    """Yield dotted keys below `ros__parameters` with their values."""
     for key, value in block.items():
         name = f"{path}.{key}" if path else str(key)
         if isinstance(value, Mapping):
@@ -154,11 +154,11 @@ def _check_leaf(key: str, value: Any, path: str) -> None:
     items = value if isinstance(value, list) else [value]
     kinds = {float if type(item) is int else type(item) for item in items}
     if not kinds <= {bool, float, str} or len(kinds) > 1:
-        raise ScenarioError(key, repr(value), "numbers, texts, or true and false", path)
+        raise ScenarioError(key, repr(value), "numbers, strings, or true and false", path)
 
 
 def _plain(value: Any) -> Any:
-    """The same content with lists of whole and other numbers made one kind."""
+    """Return the content with lists of mixed integers and floats converted to floats."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list) and {type(item) for item in value} == {int, float}:

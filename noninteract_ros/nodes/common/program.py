@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start and end of a program: wrong arguments in one line, signals without a trace."""
+"""Startup and shutdown of a program: argument errors in one line, no traceback on signals."""
 
 import ctypes
 import os
@@ -20,78 +20,78 @@ from rclpy.utilities import remove_ros_args
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.common.parameter_files import origin_of_key, rewrite
 
-STARTER = "NONINTERACT_ROS_STARTER"  # Process id of whoever ends the programs that it starts.
+STARTER = "NONINTERACT_ROS_STARTER"  # Environment variable with the process id of the parent.
 PR_SET_PDEATHSIG = 1  # <linux/prctl.h>
 
 
 class Runnable(Protocol):
-    """A node that a program consists of.
+    """Node of a program.
 
     Attributes:
-        told_to_stop: Whether it was, asked by a node with last words.
+        shutdown_requested: Return True after SIGINT or SIGTERM.
     """
 
-    told_to_stop: Callable[[], bool]
+    shutdown_requested: Callable[[], bool]
 
     @property
-    def has_last_words(self) -> bool:
-        """Whether it has something to say before the context may be shut down."""
+    def handles_shutdown(self) -> bool:
+        """True where `run` still publishes after SIGINT or SIGTERM and then returns."""
 
     def run(self) -> None:
-        """Runs until the context is shut down; with last words, until it is told to stop."""
+        """Run until the context is shut down, or until shutdown is handled."""
 
     def destroy_node(self) -> None:
-        """Ends the node."""
+        """Destroy the node."""
 
 
 class StopSignal:
-    """Turns SIGINT and SIGTERM into a flag: no exception breaks off what is being done.
+    """Handler of SIGINT and SIGTERM that sets a flag instead of raising an exception.
 
     Attributes:
-        came: Whether one of the signals has come.
+        received: True once one of the signals was received.
     """
 
     def __init__(self) -> None:
-        self.came = False
+        self.received = False
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, self._note)
+            signal.signal(number, self._on_signal)
 
-    def _note(self, number: int, frame: FrameType | None) -> None:
-        self.came = True
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self.received = True
 
 
 @contextmanager
 def until_shutdown(context: rclpy.Context) -> Iterator[None]:
-    """Ends the block quietly where it fails because the context was shut down."""
+    """Leave the block without an error if it fails because the context was shut down."""
     try:
         yield
     except ExternalShutdownException:
         pass
-    except RuntimeError:  # What publishing, and most else, raises without a context.
+    except RuntimeError:  # Raised by publishers, among others, without a context.
         if context.ok():
             raise
 
 
-def end_with_starter() -> None:
-    """Asks for SIGINT when the process named by `STARTER` ends: none that it started is left.
+def follow_starter() -> None:
+    """Request SIGINT for this process when the parent given by `STARTER` ends.
 
-    However that one ends, it may have been killed.
+    No program outlives a parent that is killed.
     """
     starter = os.environ.get(STARTER)
     if starter is None:
         return
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGINT)
-    if os.getppid() != int(starter):  # It has ended already.
+    if os.getppid() != int(starter):  # The parent has ended already.
         signal.raise_signal(signal.SIGINT)
 
 
 def init(arguments: Sequence[str], signals: SignalHandlerOptions) -> None:
-    """Starts ROS with a command line whose parameter files are made readable for it.
+    """Initialize rclpy with parameter files rewritten for the parser of ROS.
 
     Raises:
         ScenarioError: An argument or a parameter file is wrong.
     """
-    end_with_starter()
+    follow_starter()
     with TemporaryDirectory() as folder:
         ros_arguments = rewrite(arguments, Path(folder))
         try:
@@ -105,30 +105,31 @@ def init(arguments: Sequence[str], signals: SignalHandlerOptions) -> None:
 
 
 def run_program(make: Callable[[], Runnable], arguments: Sequence[str] | None) -> int:
-    """Main function of a program.
+    """Run the node of a program.
+
+    An error in an argument or a parameter is printed in one line.
 
     Args:
-        make: Makes its node.
-        arguments: Command line, by default the one of this process.
+        make: Factory of the node.
+        arguments: Command line; by default that of this process.
 
     Returns:
-        Exit status: 0 after SIGINT or SIGTERM, 2 where an argument or a parameter is wrong; that
-        is said in one line.
+        Exit status: 0 after SIGINT or SIGTERM, 2 after an error in an argument or a parameter.
     """
     argv = list(sys.argv if arguments is None else arguments)
-    # ROS shuts the context down at a signal, then calls the handler that it found.
+    # On a signal ROS shuts the context down, then calls the handler installed before.
     stop = StopSignal()
     node = None
     try:
         init(argv, SignalHandlerOptions.ALL)
         with until_shutdown(rclpy.get_default_context()):
             node = make()
-            # The loop must not wait for the executor's thread for long.
+            # The loop must not wait long for the executor thread.
             sys.setswitchinterval(0.0005)
-            if node.has_last_words:  # ROS would shut the context down before they are said.
+            if node.handles_shutdown:  # ROS would shut the context down at once.
                 uninstall_signal_handlers()
-                node.told_to_stop = lambda: stop.came
-            if not stop.came:
+                node.shutdown_requested = lambda: stop.received
+            if not stop.received:
                 node.run()
     except ScenarioError as error:
         named = error.file or origin_of_key(argv, error.key)

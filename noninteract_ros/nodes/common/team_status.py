@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether the team's time stands on purpose, which only a simulated team can tell."""
+"""Status of the simulated team, from its diagnostics."""
 
 import time
 
@@ -8,14 +8,16 @@ from diagnostic_msgs.msg import DiagnosticArray
 from noninteract_ros.nodes.common.node import DIAGNOSTICS_PERIOD, ScenarioNode
 
 TEAM = "robot_team"
-# What the team says of itself then, its whole sentence.
+# Messages in the diagnostics of the simulated team.
 PAUSED, FINISHED = "paused", "finished"
 REASONS = {PAUSED: "the team is paused", FINISHED: "the team has finished"}
-SILENT = 4.0 * DIAGNOSTICS_PERIOD  # [s] after which a team that said so is believed to be gone
+STATUS_TIMEOUT = 4.0 * DIAGNOSTICS_PERIOD  # [s] without diagnostics after which it has ended
 
 
 class TeamStatus:
-    """Hears in the diagnostics why the simulated team sends no states, as long as it lives.
+    """Subscription to the diagnostics of the simulated team.
+
+    Distinguishes a paused or finished team from one whose states are missing.
 
     Args:
         node: Node that subscribes.
@@ -23,16 +25,16 @@ class TeamStatus:
 
     def __init__(self, node: ScenarioNode) -> None:
         self._name = node.resolve_topic_name(TEAM)
-        self._reason, self._heard_at = "", 0.0
-        node.subscribe(DiagnosticArray, "/diagnostics", self._take)
+        self._reason, self._received_at = "", 0.0
+        node.subscribe(DiagnosticArray, "/diagnostics", self._on_diagnostics)
 
-    def _take(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for item in message.status:
             if item.name == self._name:
                 self._reason = REASONS.get(item.message, "")
-                self._heard_at = time.monotonic()
+                self._received_at = time.monotonic()
 
     @property
     def reason(self) -> str:
-        """Why it stands, in words; empty, where it does not, or is not heard of any more."""
-        return self._reason if time.monotonic() - self._heard_at < SILENT else ""
+        """Reason why the team sends no states on purpose; empty otherwise or after the timeout."""
+        return self._reason if time.monotonic() - self._received_at < STATUS_TIMEOUT else ""

@@ -22,7 +22,7 @@ from noninteract_ros.console.frames import encode_poses
 from noninteract_ros.console.handles import drivable_subtasks
 from noninteract_ros.console.held_input import DeadMansSwitch, HeldInput
 from noninteract_ros.console.protocol import PageCommand
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, Ticker
+from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, WallRate
 from noninteract_ros.nodes.common.program import run_program
 from noninteract_ros.nodes.console.service_clients import ServiceClients
 from noninteract_ros.nodes.console.status import StackStatus
@@ -133,12 +133,12 @@ class OperatorConsole(ScenarioNode):
 
     def loop(self) -> None:
         """Publish references at the update rate and send frames at the frame rate."""
-        ticker = Ticker(self.settings.update_rate)
+        rate = WallRate(self.settings.update_rate)
         divisor = max(1, round(self.settings.update_rate / self.settings.frame_rate))
         count = 0
         try:
             while self.context.ok():
-                ticker.wait()
+                rate.sleep()
                 self._process_commands()
                 self._publish_references()
                 if count % divisor == 0 and self._server.pages:

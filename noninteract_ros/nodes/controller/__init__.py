@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The program `controller`."""
+"""Node of the program `controller`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program `controller`: the central decoupling controller."""
+"""Program `controller`: central decoupling controller of the team."""
 
 import time
 from collections import deque
@@ -14,31 +14,30 @@ from std_srvs.srv import Trigger
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds
 from noninteract_ros.control.controller import TeamController
-from noninteract_ros.control.references.inputs import HORIZON, SOURCES, Force, MotionInput
+from noninteract_ros.control.references.inputs import HORIZON, SOURCES
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.common.lockstep import SourceWatch, StampOrder, state_lead
-from noninteract_ros.nodes.common.node import ScenarioNode, Ticker
+from noninteract_ros.nodes.common.lockstep import LockstepSources, StampChecker, max_stamp_lead
+from noninteract_ros.nodes.common.node import ScenarioNode, WallRate
 from noninteract_ros.nodes.common.program import run_program
 from noninteract_ros.nodes.common.team_status import TeamStatus
-from noninteract_ros.nodes.controller.authority import AuthorityTopics
 from noninteract_ros.nodes.controller.diagnostics import ControllerDiagnostics
-from noninteract_ros.nodes.controller.parameters import LiveParameters
-from noninteract_ros.nodes.controller.source_topics import listen
-from noninteract_ros.nodes.controller.team_link import TeamLink
+from noninteract_ros.nodes.controller.parameters import AuthorityTopics, LiveParameters
+from noninteract_ros.nodes.controller.source_subscriptions import Input, subscribe_to_source
+from noninteract_ros.nodes.controller.team_interface import TeamInterface
 from noninteract_ros.nodes.controller.telemetry import Telemetry
 from noninteract_ros.nodes.messages.messages import Level, SubtaskCodec, stamp_ns
 
-WATCH_PERIOD = 0.1  # [s] how often absent lockstep sources and planned hand-overs are looked for
-BRAKE_TIME = 2.0  # [s] given to effort-controlled robots to come to rest when the program ends
-AT_REST = 1e-3  # [m/s or rad/s]
-WAIT_SHOWN = 0.3  # [s] of waiting for something that is worth a word
+CHECK_PERIOD = 0.1  # [s] between checks for absent lockstep sources and planned hand-overs
+BRAKE_TIME = 2.0  # [s] maximum time to brake effort-controlled robots on shutdown
+REST_SPEED = 1e-3  # [m/s or rad/s]
+MIN_REPORTED_WAIT = 0.3  # [s] minimum wait before it is reported
 
 
 class Controller(ScenarioNode):
-    """Answers each state of the team with the torques of the law.
+    """Node that answers each state of the team with the torques of the control law.
 
-    Callbacks only queue what they received; the loop, or in lockstep the callback itself, works
-    it off before the next tick, so that the core is touched by one thread.
+    Callbacks only queue their work. The loop, or in lockstep the callback itself, does the queued
+    work before the next tick, so that one thread alone uses the core.
     """
 
     LIVE = True
@@ -46,133 +45,128 @@ class Controller(ScenarioNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("controller", **kwargs)
         general = self.scenario.general
-        self.get_logger().info("preparing the law; its first start on a machine takes a while")
-        team = self.scenario.build_team()
-        stack = self.scenario.build_stack(team)
+        self.get_logger().info("compiling the control law; this takes longer on the first start")
+        team, stack = self.scenario.team, self.scenario.stack
         self.core: TeamController = self.scenario.build_controller(team, stack)
         self.core.prepare()
         self._queue: deque[Callable[[], None]] = deque()
         self._state: tuple[int, Array, Array, Array | None] | None = None
-        self._state_at = self._waiting_since = -np.inf
-        self._order, self._lead = StampOrder(), state_lead(general.rate)
+        self._state_received_at = self._waiting_since = -np.inf
+        self._stamps, self._max_lead = StampChecker(), max_stamp_lead(general.rate)
         self._missing: list[str] = []
         self._answered: int | None = None
-        self._put_back: int | None = None
-        self._stop_asked = False
+        self._reset_stamp: int | None = None
+        self._stop_requested = False
         self._now = 0.0
         self._telemetry = Telemetry(self, team, stack)
-        self._chronicle = ControllerDiagnostics(self, self.core, self._telemetry)
+        self._controller_diagnostics = ControllerDiagnostics(self, self.core, self._telemetry)
         self._live = LiveParameters(
-            self, self.core, self._post, self._chronicle.changed, self._configuration
+            self, self.core, self._post, self._controller_diagnostics.changed, self._configuration
         )
         self._authority = AuthorityTopics(self, stack.names)
-        self._standing = TeamStatus(self)
-        self._watch = SourceWatch(
+        self._team_status = TeamStatus(self)
+        self._sources = LockstepSources(
             general.lockstep_sources if self.lockstep else (),
             self.core.inputs,
             general.lockstep_timeout,
         )
-        self._link = TeamLink(self, team, self._take_state)
-        self.subscribe(Header, "put_back", self._on_put_back)
+        self._interface = TeamInterface(self, team, self._on_state)
+        self.subscribe(Header, "put_back", self._on_team_reset)
         for subtask in stack.subtasks:
             codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes, subtask.rotates)
             for source in SOURCES:
-                listen(self, codec, source, self._take_input)
+                subscribe_to_source(self, codec, source, self._on_input)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self.create_service(Trigger, "~/resume", self._on_resume)
         self.create_service(Trigger, "~/refill", self._on_refill)
         if self.lockstep:
-            self.every(WATCH_PERIOD, self._answer_if_complete)
-        self.every(WATCH_PERIOD, self._live.follow_authority)
+            self.create_wall_timer(CHECK_PERIOD, self._answer_if_complete)
+        self.create_wall_timer(CHECK_PERIOD, self._live.sync_authority)
 
-    def _take_input(
-        self, topic: str, subtask: str, source: str, parsed: tuple[int, MotionInput | Force | None]
-    ) -> None:
-        self._post(partial(self._receive, topic, subtask, source, parsed))
+    def _on_input(self, topic: str, subtask: str, source: str, received: Input) -> None:
+        self._post(partial(self._receive, topic, subtask, source, received))
 
     def _post(self, work: Callable[[], None]) -> None:
-        """Has the thread of the core do something before its next tick."""
+        """Queue work for the thread of the core, to be done before the next tick."""
         self._queue.append(work)
         if self.lockstep:
-            self._work_off()
+            self._run_queue()
             self._answer_if_complete()
 
-    def _work_off(self) -> None:
+    def _run_queue(self) -> None:
         while self._queue:
             self._queue.popleft()()
 
-    def _receive(
-        self, topic: str, subtask: str, source: str, parsed: tuple[int, MotionInput | Force | None]
-    ) -> None:
-        """Hands an input to the core, or notes that a source has none."""
-        if not self._team_is_there():
-            return  # Its time is not known; in lockstep sources say again what is needed.
-        stamp, item = parsed
-        heard = self.core.inputs[subtask].sources[source]
+    def _receive(self, topic: str, subtask: str, source: str, received: Input) -> None:
+        """Pass an input, or the marker that there is none, to the core."""
+        if not self._has_fresh_state():
+            return  # The time of the team is unknown; lockstep sources resend their inputs.
+        stamp, item = received
+        inputs = self.core.inputs[subtask].sources[source]
         when = seconds(stamp)
-        if self._watch.begins_ahead(f"{subtask}/{source}", when, self._now):
+        if self._sources.starts_late(f"{subtask}/{source}", when, self._now):
             return
         if item is None:
-            heard.mark_complete_until(when)
+            inputs.mark_complete_until(when)
             return
-        if self.lockstep and self._now <= when < seconds(self._order.last(topic)):
-            return  # A source that saw the state again says again what it has said.
-        # Without a stamp, or by another clock than the team's, an input holds from now on.
+        if self.lockstep and self._now <= when < seconds(self._stamps.last(topic)):
+            return  # Resent by a source that received the state twice.
+        # Inputs without a stamp, or stamped by another clock, take effect immediately.
         at_once = stamp == 0 or not self.lockstep
         try:
             if stamp:
-                self._order.check(topic, stamp, float("inf") if self.lockstep else HORIZON)
-            heard.receive(self._now if at_once else when, item, self._now)
+                self._stamps.check(topic, stamp, float("inf") if self.lockstep else HORIZON)
+            inputs.receive(self._now if at_once else when, item, self._now)
         except InputError as error:
-            self.refuse(topic, str(error))
+            self.reject_input(topic, str(error))
             return
         if stamp:
-            self._order.note(topic, stamp)
+            self._stamps.record(topic, stamp)
 
-    def _team_is_there(self) -> bool:
-        age = time.monotonic() - self._state_at
+    def _has_fresh_state(self) -> bool:
+        age = time.monotonic() - self._state_received_at
         fresh = self.lockstep or age <= self.scenario.general.state_timeout
         return self._state is not None and fresh
 
-    def _take_state(self, stamp: int, positions: Array, v: Array) -> None:
-        """Takes joint positions and velocities (n,) of the team at a stamp [ns]."""
+    def _on_state(self, stamp: int, positions: Array, v: Array) -> None:
+        """Receive joint positions and velocities (n,) of the team at a stamp [ns]."""
         q = self.core.team.configuration_from_joints(positions)
-        if self._order.take("joint_states", stamp, self._lead):
-            self._begin_anew(stamp)
-        self._state_at = time.monotonic()
+        if self._stamps.accept("joint_states", stamp, self._max_lead):
+            self._restart(stamp)
+        self._state_received_at = time.monotonic()
         if stamp == self._answered:
-            if self.lockstep:  # The team has not seen the answer.
-                self._link.repeat()
+            if self.lockstep:  # The team has not received the answer.
+                self._interface.resend()
             return
         if self._state is None or stamp != self._state[0]:
-            self._waiting_since = self._state_at
-        # In lockstep it can only be the last answer.
-        self._state = (stamp, q, v, None if self.lockstep else self._link.applied)
+            self._waiting_since = self._state_received_at
+        # In lockstep the applied torque can only be the last answer.
+        self._state = (stamp, q, v, None if self.lockstep else self._interface.applied)
         if self.lockstep:
             self._answer_if_complete()
 
-    def _on_put_back(self, message: Header) -> None:
-        """The team is at its start again from a state on, while its time goes on."""
-        self._put_back = stamp_ns(message.stamp)
+    def _on_team_reset(self, message: Header) -> None:
+        """Receive the stamp of the first state after a reset of the team; its time goes on."""
+        self._reset_stamp = stamp_ns(message.stamp)
 
     def _configuration(self) -> Array | None:
         state = self._state
         return None if state is None else state[1]
 
-    def _begin_anew(self, stamp: int) -> None:
-        """The team was started anew: what was heard belongs to its former life."""
-        self._state = self._answered = self._put_back = None
-        self._order.forget()
-        self._order.note("joint_states", stamp)
-        self._telemetry.forget()
+    def _restart(self, stamp: int) -> None:
+        """Discard inputs received before the restart of the team."""
+        self._state = self._answered = self._reset_stamp = None
+        self._stamps.reset()
+        self._stamps.record("joint_states", stamp)
+        self._telemetry.reset()
         self._post(self.core.reset)
 
     def _answer_if_complete(self) -> None:
-        """Lockstep: answers the state once all that belongs to its tick has come."""
+        """Lockstep: answer the state once all inputs of its tick are received."""
         if self._state is None or self._answered == self._state[0]:
             return
         self._now = seconds(self._state[0])
-        self._missing = self._watch.missing(self._now, self._waiting_since)
+        self._missing = self._sources.missing(self._now, self._waiting_since)
         if not self._missing:
             self._missing = self._telemetry.missing(self._state[0])
         if not self._missing:
@@ -180,105 +174,110 @@ class Controller(ScenarioNode):
 
     def _answer(self, stamp: int, q: Array, v: Array, applied: Array | None) -> None:
         began = time.perf_counter()
-        if self._put_back is not None and stamp >= self._put_back:
-            self._put_back = None
+        if self._reset_stamp is not None and stamp >= self._reset_stamp:
+            self._reset_stamp = None
             self.core.put_back()
         tick = self.core.step(seconds(stamp), q, v, applied, self._telemetry.wrenches)
-        self._link.answer(stamp, tick)
+        self._interface.answer(stamp, tick)
         self._answered = stamp
         self._telemetry.publish(stamp, self.core, tick)
-        self._chronicle.note(seconds(stamp), tick)
-        self._chronicle.cycle_times.append(time.perf_counter() - began)
+        self._controller_diagnostics.update(seconds(stamp), tick)
+        self._controller_diagnostics.cycle_times.append(time.perf_counter() - began)
 
     def loop(self) -> None:
-        """Wall time: answers the newest state once per period."""
-        ticker = Ticker(self.scenario.general.rate)
-        while self.context.ok() and not self.told_to_stop():
-            ticker.wait()
-            self.turn()
-        if self.context.ok() and self._link.efforts:
-            self._end(ticker)
+        """Wall time: answer the newest state once per period."""
+        rate = WallRate(self.scenario.general.rate)
+        while self.context.ok() and not self.shutdown_requested():
+            rate.sleep()
+            self.run_once()
+        if self.context.ok() and self._interface.efforts:
+            self._shut_down(rate)
 
-    def _end(self, ticker: Ticker) -> None:
-        """Brakes the team, for effort controllers would hold the last torques for ever."""
+    def _shut_down(self, rate: WallRate) -> None:
+        """Brake the team, since effort controllers would hold the last torques indefinitely."""
         self._post(self.core.stop)
         end = time.monotonic() + BRAKE_TIME
-        while self._state is not None and np.abs(self._state[2]).max() > AT_REST:
+        while self._state is not None and np.abs(self._state[2]).max() > REST_SPEED:
             if time.monotonic() > end:
                 break
-            ticker.wait()
-            self.turn()
-        self._link.efforts.end()
+            rate.sleep()
+            self.run_once()
+        self._interface.efforts.shut_down()
 
     @property
-    def has_last_words(self) -> bool:
-        """Whether it has robots to brake before it ends."""
-        return self.has_loop and bool(self._link.efforts)
+    def handles_shutdown(self) -> bool:
+        """True where effort-controlled robots are braked before the program ends."""
+        return self.has_loop and bool(self._interface.efforts)
 
-    def turn(self) -> None:
-        """Wall time: does what has come in, and answers the newest state unless it is answered."""
-        self._link.poll()
-        self._keep_still(self.descriptions.problem or self._link.problem())
+    def run_once(self) -> None:
+        """Wall time: process received inputs and answer the newest state if it is unanswered."""
+        self._interface.poll()
+        self._hold_team(self.descriptions.problem or self._interface.problem())
         state = self._state
         if state is not None:
             self._now = seconds(state[0])
-        self._work_off()
+        self._run_queue()
         if state is not None and self._answered != state[0]:
             self._answer(*state)
 
     def on_description_changed(self) -> None:
-        """The law has another model than the robots: they are held still until a restart."""
+        """Hold the team until a restart, since the model no longer matches the robots."""
         if self.lockstep:
-            self._keep_still(self.descriptions.problem)
+            self._hold_team(self.descriptions.problem)
 
-    def _keep_still(self, problem: str) -> None:
-        """Holds the team still, as a stop does, while there is a problem that may go by itself."""
-        if problem == self._chronicle.problem:
+    def _hold_team(self, problem: str) -> None:
+        """Hold the team, as a stop does, while there is a problem that may disappear by itself."""
+        if problem == self._controller_diagnostics.problem:
             return
-        self._chronicle.problem = problem
+        self._controller_diagnostics.problem = problem
         if problem:
-            self.get_logger().error(f"holding the team still: {problem}")
+            self.get_logger().error(f"holding the team: {problem}")
             if not self.core.mode.stopped:
                 self.core.stop()
             return
-        self.get_logger().info("no longer holding the team still")
-        if not self._stop_asked:
+        self.get_logger().info("problem resolved: no longer holding the team")
+        if not self._stop_requested:
             self.core.resume()
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._stop_asked = True
+        self._stop_requested = True
         self._post(self.core.stop)
-        return self._done(response, "stopped")
+        return self._succeed(response, "stopped")
 
     def _on_refill(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._post(self.core.gate.refill)
-        return self._done(response, "energy tank filled")
+        return self._succeed(response, "energy tank filled")
 
     def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._stop_asked = False
-        if problem := self._chronicle.problem:
-            response.success, response.message = False, f"held still: {problem}"
+        self._stop_requested = False
+        if problem := self._controller_diagnostics.problem:
+            response.success, response.message = False, f"holding the team: {problem}"
             return response
         self._post(self.core.resume)
-        return self._done(response, "running")
+        return self._succeed(response, "running")
 
-    def _done(self, response: Trigger.Response, text: str) -> Trigger.Response:
+    def _succeed(self, response: Trigger.Response, text: str) -> Trigger.Response:
         self.get_logger().info(text)
         response.success, response.message = True, text
         return response
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
-        """State machine, cycle times, condition of the subtasks, silent sources."""
+        """Return the state machine, cycle times, subtask conditioning and silent sources."""
         now = time.monotonic()
         if self._state is None:
-            age, waiting = None, self._link.waiting_for()
+            age, waiting = None, self._interface.waiting_for()
         else:
-            age = now - self._state_at
-            waiting = self._missing if now - self._waiting_since > WAIT_SHOWN else []
-        standing = self._standing.reason
-        return self._chronicle.status(self._now, age, standing, waiting, self._watch.absent)
+            age = now - self._state_received_at
+            waiting = self._missing if now - self._waiting_since > MIN_REPORTED_WAIT else []
+        return self._controller_diagnostics.status(
+            now=self._now,
+            age=age,
+            team_status=self._team_status.reason,
+            waiting=waiting,
+            absent=self._sources.absent,
+        )
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Run the program."""
     return run_program(Controller, arguments)

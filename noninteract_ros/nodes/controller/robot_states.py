@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""States of robots that speak on topics of their own, made into those of the team."""
+"""State of the team from the joint states of its robots."""
 
 import threading
 from collections.abc import Callable, Sequence
@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.common.lockstep import StampOrder, state_lead
+from noninteract_ros.nodes.common.lockstep import StampChecker, max_stamp_lead
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.nodes.messages.cdr import (
     QUANTITIES,
@@ -25,18 +25,18 @@ from noninteract_ros.nodes.messages.cdr import (
 from noninteract_ros.team.state_assembler import AssembledState, StateAssembler
 from noninteract_ros.team.team import Team
 
-# Whatever a driver offers is taken; of what has not been read, the newest counts.
+# Compatible with any driver; only the newest messages are kept.
 DRIVER_QOS = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
-TakeState = Callable[[int, Array, Array], None]
+StateCallback = Callable[[int, Array, Array], None]
 
 
 class DriverStateCodec:
-    """Reads sensor_msgs/JointState as drivers send it: any order, other joints too, or only some.
+    """sensor_msgs/JointState of a driver: joints in any order, a subset, or with other joints.
 
     Messages of the same shape as the last one are read in place.
 
     Args:
-        names: Joints that count, as the driver calls them.
+        names: Driver names of the joints of the robot.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
@@ -49,19 +49,20 @@ class DriverStateCodec:
     def decode(
         self, data: bytes
     ) -> tuple[int, NDArray[np.intp], Array, Array, Array | None] | None:
-        """Stamp [ns], places in `names` of the joints told of, their position, velocity, effort.
+        """Return stamp [ns], joint indices in `names`, positions, velocities and efforts.
 
-        Effort is NaN or None where the driver does not know it. The whole is None where no joint
-        counts.
+        Effort is NaN or None where the driver does not measure it. The result is None for a
+        message without joints of the robot.
 
         Raises:
-            InputError: The bytes are no JointState, a joint is given twice, position or velocity
-                is missing or not finite, an array has a wrong size, the stamp is not a time.
+            InputError: The bytes are not a JointState, a joint is given twice, position or
+                velocity is missing or not finite, an array has a wrong size, or the stamp is not
+                a time.
         """
         found = self._template.decode(data) if self._template else None
         if found is None:
             message = deserialize(data, JointState)
-            self._learn(message)
+            self._set_layout(message)
             numbers = np.concatenate([getattr(message, name) for name in QUANTITIES])
             found = join_stamp(message.header.stamp.sec, message.header.stamp.nanosec), numbers
         if not self._joints.size:
@@ -70,14 +71,14 @@ class DriverStateCodec:
         ends = np.cumsum(self._sizes)
         rows = [values[end - size : end] for size, end in zip(self._sizes, ends, strict=True)]
         position, velocity = rows[0][self._columns], rows[1][self._columns]
-        told = [self._names[joint] for joint in self._joints]
-        check_finite(position, lambda i: f"position of {told[i]}")
-        check_finite(velocity, lambda i: f"velocity of {told[i]}")
+        names = [self._names[joint] for joint in self._joints]
+        check_finite(position, lambda i: f"position of {names[i]}")
+        check_finite(velocity, lambda i: f"velocity of {names[i]}")
         effort = rows[2][self._columns] if self._sizes[2] else None
         return stamp, self._joints, position, velocity, effort
 
-    def _learn(self, message: JointState) -> None:
-        """Notes where the joints stand in messages of this shape."""
+    def _set_layout(self, message: JointState) -> None:
+        """Store the columns of the joints in messages of this shape."""
         names = list(message.name)
         known = [name for name in names if name in self._names]
         if len(set(known)) < len(known):
@@ -96,77 +97,81 @@ class DriverStateCodec:
 
 
 class RobotStates:
-    """Listens to every robot and tells of the team.
+    """Subscriptions to the joint states of all robots, joined into states of the team.
 
-    Lockstep: it tells once all robots have told of the same time. Wall time: `poll` tells of the
-    newest time that any robot told of; the others are carried on to it. One that is too old for
-    that is waited for as long again, since after a hitch of a machine somebody has to be heard
-    first; then the team is told of with that robot at rest.
+    In lockstep, a state is reported once all robots have published the same stamp. In wall time,
+    `poll` reports a state at the newest stamp of any robot; the others are predicted to it. A
+    robot too old for prediction is awaited for `max_state_skew` more, since after a pause of the
+    machine one robot is always received first. Then the state is reported with that robot at rest.
 
-    What is told is published as `joint_states` too, for all other programs. Its efforts are those
-    that the robots measured; where one has none, the torques that were asked for last.
+    Each state is also published on `joint_states` for the other nodes. Its efforts are measured
+    ones; if a robot has none, they are the last commanded torques.
 
     Args:
-        node: The controller's node.
-        team: The robots.
-        take: Takes a state of the team: stamp [ns], joint positions and velocities.
+        node: Controller node.
+        team: Robot team.
+        on_state: Called with each state of the team: stamp [ns], joint positions and velocities.
+
+    Attributes:
+        commanded: Last commanded torques, shape (n,) [N or N m].
+        late: Names of the robots too old for prediction.
     """
 
-    def __init__(self, node: ScenarioNode, team: Team, take: TakeState) -> None:
+    def __init__(self, node: ScenarioNode, team: Team, on_state: StateCallback) -> None:
         general = node.scenario.general
-        self._node, self._team, self._take = node, team, take
+        self._node, self._team, self._callback = node, team, on_state
         self._max_skew = general.max_state_skew
         self._late_since: int | None = None
         self._assembler = StateAssembler(
             team.joint_names, general.state_prediction, general.max_state_skew
         )
         self._lock = threading.Lock()
-        self._order, self._lead = StampOrder(), state_lead(general.rate)
+        self._stamps, self._max_lead = StampChecker(), max_stamp_lead(general.rate)
         self._codec = JointStateCodec(team.joint_names)
-        self._publish_to = node.create_publisher(JointState, "joint_states", LOOP_QOS)
-        self.asked = np.zeros(team.n)
+        self._publisher = node.create_publisher(JointState, "joint_states", LOOP_QOS)
+        self.commanded = np.zeros(team.n)
         self.late: tuple[str, ...] = ()
         qos = LOOP_QOS if node.lockstep else DRIVER_QOS
-        for robot, part in zip(team.robots, team.velocity_slices, strict=True):
+        for robot, joints in zip(team.robots, team.velocity_slices, strict=True):
             wiring = node.scenario.robots[robot.name].topics
             codec = DriverStateCodec(wiring.driver_joints(list(robot.model.names)[1:]))
             topic = wiring.joint_states_topic
-            listen = partial(self._on_message, topic, codec, part.start)
-            node.subscribe(JointState, topic, listen, raw=True, qos=qos)
+            callback = partial(self._on_message, topic, codec, joints.start)
+            node.subscribe(JointState, topic, callback, raw=True, qos=qos)
 
     def _on_message(self, topic: str, codec: DriverStateCodec, first: int, data: bytes) -> None:
-        told = codec.decode(data)
-        if told is None:
+        decoded = codec.decode(data)
+        if decoded is None:
             return
-        stamp, places, position, velocity, effort = told
-        joints = places + first
+        stamp, indices, position, velocity, effort = decoded
+        joints = indices + first
         with self._lock:
             if not self._node.lockstep:
-                # Who gives no time is believed to speak of now.
+                # Unstamped messages use the current time.
                 stamp = stamp or self._node.get_clock().now().nanoseconds
-                if self._order.take(f"{topic} {joints[0]}", stamp, self._lead):
+                if self._stamps.accept(f"{topic} {joints[0]}", stamp, self._max_lead):
                     self._assembler.reset(joints)
             self._assembler.update(joints, stamp, position, velocity, effort)
             if not (self._node.lockstep and self._assembler.simultaneous):
                 return
             state = self._assembler.assemble()
-        self._tell(state)
+        self._publish(state)
 
     def poll(self) -> None:
-        """Wall time: tells of the team, if a robot has told something new."""
+        """Wall time: report a state of the team if a robot has published a new one."""
         with self._lock:
             state = self._assembler.assemble() if self._assembler.ready else None
-        if state is None or self._waits(state):
+        if state is None or self._should_wait(state):
             return
         parts = zip(self._team.names, self._team.velocity_slices, strict=True)
         self.late = tuple(name for name, part in parts if state.late[part].any())
         try:
-            self._tell(state)
+            self._publish(state)
         except InputError as error:
-            self._node.refuse("joint_states", str(error))
+            self._node.reject_input("joint_states", str(error))
 
-    def _waits(self, state: AssembledState) -> bool:
-        """Whether it is too early to go on without those who are late."""
+    def _should_wait(self, state: AssembledState) -> bool:
+        """Return True while late robots are still awaited."""
         if not state.late.any():
             self._late_since = None
             return False
@@ -174,23 +179,23 @@ class RobotStates:
             self._late_since = state.stamp_ns
         return (state.stamp_ns - self._late_since) * 1e-9 <= self._max_skew
 
-    def _tell(self, state: AssembledState) -> None:
-        known = np.isfinite(state.effort).all()
-        effort = state.effort if known else self.asked
-        self._publish_to.publish(
+    def _publish(self, state: AssembledState) -> None:
+        measured = np.isfinite(state.effort).all()
+        effort = state.effort if measured else self.commanded
+        self._publisher.publish(
             self._codec.encode(state.stamp_ns, state.position, state.velocity, effort)
         )
-        self._take(state.stamp_ns, state.position, state.velocity)
+        self._callback(state.stamp_ns, state.position, state.velocity)
 
     def problem(self) -> str:
-        """Which robots are late, or an empty text."""
+        """Return the error text of late robots, or ""."""
         if not self.late:
             return ""
         limit = 1e3 * self._max_skew
-        return f"states of {', '.join(self.late)} are more than {limit:g} ms behind the others'"
+        return f"states of {', '.join(self.late)} are more than {limit:g} ms older than the others"
 
     def waiting_for(self) -> list[str]:
-        """Robots that have not told of all their joints yet."""
+        """Return the robots of which not all joints have been received."""
         with self._lock:
-            unheard = self._assembler.missing
-        return list(dict.fromkeys(name.partition("/")[0] for name in unheard))
+            missing = self._assembler.missing
+        return list(dict.fromkeys(name.partition("/")[0] for name in missing))

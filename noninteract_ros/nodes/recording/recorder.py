@@ -225,7 +225,7 @@ def main(args: Sequence[str] | None = None) -> int:
     try:
         init(argv, SignalHandlerOptions.NO)
         node = RecorderNode(next(iter(files_of(argv)), ""))
-        node.run(lambda: stop.came)
+        node.run(lambda: stop.received)
         writer = node.writer
         lost = f", {node.lost} lost" if node.lost else ""
         print(f"{writer.path}: {writer.messages} messages on {writer.topics} topics{lost}")

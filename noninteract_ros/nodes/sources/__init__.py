@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The programs that send references for a human or for autonomy."""
+"""Nodes of the sources: references and inputs of a human or of autonomy."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program `joy_operator`: a gamepad or space mouse that leads a subtask by rates."""
+"""Program `joy_operator`: rate commands from a gamepad or space mouse."""
 
 import time
 from collections.abc import Sequence
@@ -17,7 +17,10 @@ from noninteract_ros.subtasks.reference import Reference
 
 
 class JoyOperator(OperatorNode):
-    """Leads while the enable button is held, or without one while the device is deflected."""
+    """Node that commands rates while the enable button is held.
+
+    Without an enable button, it commands rates while the device is deflected.
+    """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("joy_operator", **kwargs)
@@ -31,11 +34,11 @@ class JoyOperator(OperatorNode):
         self._stick = stick
         self.dead_man.update(time.monotonic(), held)
 
-    def lead(self, now: float, desired: Reference) -> None:
-        """A rate in proportion to the deflection."""
-        self.say_rate(self.input.rate(self._stick, desired))
+    def command(self, now: float, desired: Reference) -> None:
+        """Publish a rate proportional to the deflection."""
+        self.publish_rate(self.input.rate(self._stick, desired))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Run the program."""
     return run_program(JoyOperator, arguments)

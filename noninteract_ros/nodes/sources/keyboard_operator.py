@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program `keyboard_operator`: keys of a terminal that lead a subtask by rates."""
+"""Program `keyboard_operator`: rate commands from the keys of a terminal."""
 
 import os
 import select
@@ -22,14 +22,16 @@ READ_PERIOD = 0.01  # [s]
 
 
 class KeyboardOperator(OperatorNode):
-    """Leads while keys are held; a terminal that is gone holds none.
+    """Node that commands rates while keys are held.
+
+    A closed terminal shuts the node down.
 
     Args:
         terminal: File descriptor of the terminal; by default standard input.
-        kwargs: Passed on to `rclpy.node.Node`.
+        kwargs: Arguments of `rclpy.node.Node`.
 
     Raises:
-        ScenarioError: There is no terminal.
+        ScenarioError: Standard input is not a terminal.
     """
 
     def __init__(self, terminal: int | None = None, **kwargs: Any) -> None:
@@ -38,12 +40,12 @@ class KeyboardOperator(OperatorNode):
         if not os.isatty(self._terminal):
             raise ScenarioError("(terminal)", "none on standard input", "a terminal")
         self._keys = KeyState(self.scenario.keyboard or KeyboardSettings())
-        self._before = termios.tcgetattr(self._terminal)
+        self._terminal_settings = termios.tcgetattr(self._terminal)
         tty.setcbreak(self._terminal)
-        self.every(READ_PERIOD, self._read)
+        self.create_wall_timer(READ_PERIOD, self._read_keys)
         print(HELP, flush=True)
 
-    def _read(self) -> None:
+    def _read_keys(self) -> None:
         now = time.monotonic()
         while select.select([self._terminal], [], [], 0.0)[0]:
             try:
@@ -60,19 +62,19 @@ class KeyboardOperator(OperatorNode):
                 self._keys.press(key, now)
         self.dead_man.update(now, bool(self._keys.stick(now).any()))
 
-    def lead(self, now: float, desired: Reference) -> None:
-        """A rate in the directions of the keys."""
-        self.say_rate(self.input.rate(self._keys.stick(now), desired))
+    def command(self, now: float, desired: Reference) -> None:
+        """Publish a rate in the directions of the held keys."""
+        self.publish_rate(self.input.rate(self._keys.stick(now), desired))
 
     def destroy_node(self) -> None:
-        """Ends the node and gives the terminal back as it was."""
-        before = getattr(self, "_before", None)
-        if before is not None:
-            with suppress(termios.error):  # The terminal may be gone.
-                termios.tcsetattr(self._terminal, termios.TCSADRAIN, before)
+        """Destroy the node and restore the terminal settings."""
+        settings = getattr(self, "_terminal_settings", None)
+        if settings is not None:
+            with suppress(termios.error):  # The terminal may be closed.
+                termios.tcsetattr(self._terminal, termios.TCSADRAIN, settings)
         super().destroy_node()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Run the program."""
     return run_program(KeyboardOperator, arguments)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program `pose_operator`: a haptic device or tracker that leads a subtask by its pose."""
+"""Program `pose_operator`: set-points from the pose of a haptic device or tracker."""
 
 import time
 from collections.abc import Sequence
@@ -24,16 +24,18 @@ from noninteract_ros.subtasks.reference import Reference
 
 
 class PoseOperator(OperatorNode):
-    """Leads while the clutch is held: the subtask moves from where it is as the device does.
+    """Node that commands set-points while the clutch is held.
 
-    The device's silence lets go, and so does a pose that has jumped. A clutch on a Joy lets go by
-    its silence, too, for drivers repeat what is pressed; a Bool holds until it is told otherwise.
+    The subtask starts from its current value and moves by the motion of the device. The clutch is
+    released when the device times out, or when its pose jumps. A clutch on a Joy topic is also
+    released when that topic times out, since drivers repeat pressed buttons. A clutch on a Bool
+    topic is held until a message releases it.
     """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("pose_operator", **kwargs)
         settings = self.scenario.tracker or TrackerSettings()
-        self._largest_jump = settings.largest_jump
+        self._max_jump = settings.largest_jump
         self._mounting = _mounting(settings)
         self._button = settings.clutch_button
         self._clutch, self._pressed = False, DeadManSwitch(self.settings.hold_timeout)
@@ -48,8 +50,8 @@ class PoseOperator(OperatorNode):
         self._clutch = message.data
 
     def _on_joy(self, message: Joy) -> None:
-        there = len(message.buttons) > self._button
-        self._pressed.update(time.monotonic(), there and bool(message.buttons[self._button]))
+        exists = len(message.buttons) > self._button
+        self._pressed.update(time.monotonic(), exists and bool(message.buttons[self._button]))
 
     def _on_pose(self, message: PoseStamped) -> None:
         pose = flat(message.pose.position, message.pose.orientation)
@@ -66,21 +68,21 @@ class PoseOperator(OperatorNode):
         now = time.monotonic()
         held = self._clutch or self._pressed.is_held(now)
         if before is not None and self.dead_man.is_held(now):
-            way = float(np.linalg.norm(pose[:3] - before[:3]))
-            if way > self._largest_jump:
+            jump = float(np.linalg.norm(pose[:3] - before[:3]))
+            if jump > self._max_jump:
                 self.dead_man.release()
-                raise InputError(f"the pose jumped by {way:.3g} m: the clutch lets go")
+                raise InputError(f"the pose jumped by {jump:.3g} m: clutch released")
         self.dead_man.update(now, held)
 
-    def lead(self, now: float, desired: Reference) -> None:
-        """A set-point that is as far from where the clutch was taken as the device is."""
-        assert self._pose is not None  # Without a pose nothing is held.
+    def command(self, now: float, desired: Reference) -> None:
+        """Publish the set-point moved by the motion of the device since it was clutched."""
+        assert self._pose is not None  # The clutch is not held without a pose.
         if not self.input.clutched:
             self.input.engage(self._pose, desired.position)
-        self.say_target(self.input.target(self._pose))
+        self.publish_target(self.input.target(self._pose))
 
-    def let_go(self) -> None:
-        """Lets the clutch go."""
+    def release(self) -> None:
+        """Release the clutch."""
         self.input.release()
 
 
@@ -96,5 +98,5 @@ def _mounting(settings: TrackerSettings) -> Array:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Run the program."""
     return run_program(PoseOperator, arguments)

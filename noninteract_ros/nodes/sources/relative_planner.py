@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program `relative_planner`: autonomy that plans the formation."""
+"""Program `relative_planner`: autonomous planner of the formation."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -9,17 +9,16 @@ from noninteract_ros.nodes.sources.source import SourceNode
 
 
 class RelativePlanner(SourceNode):
-    """Leads a subtask as the autonomous source."""
+    """Node that commands a subtask as its autonomous source."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("relative_planner", **kwargs)
-        stack = self.scenario.build_stack(self.scenario.build_team())
-        planner = self.scenario.build_planner(stack)
+        planner = self.scenario.build_planner(self.scenario.stack)
         settings = self.scenario.planner
-        assert settings is not None  # build_planner refuses a scenario without it.
-        self.speak_for(planner, settings.subtask, "autonomy", settings.update_rate)
+        assert settings is not None  # build_planner raises without this block.
+        self.set_up_source(planner, settings.subtask, "autonomy", settings.update_rate)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Run the program."""
     return run_program(RelativePlanner, arguments)

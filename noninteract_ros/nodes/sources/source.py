@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A program that speaks for one source of one subtask."""
+"""Base class of the nodes that publish the references of one source of one subtask."""
 
 import time
 
@@ -11,8 +11,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.common.lockstep import StampOrder, state_lead
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, Ticker
+from noninteract_ros.nodes.common.lockstep import StampChecker, max_stamp_lead
+from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, WallRate
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import Level, SubtaskCodec
 from noninteract_ros.sources.announcements import Announcer, Sampler
@@ -20,103 +20,107 @@ from noninteract_ros.subtasks.reference import Reference
 
 
 class SourceNode(ScenarioNode):
-    """Publishes what a sampler says as references of a subtask.
+    """Node that publishes the samples of a sampler as references of a subtask.
 
-    Lockstep: having seen the state of a tick it speaks ahead, for everything up to the next tick.
-    Wall time: it speaks at its update rate, its time counted from the first state that it sees.
+    In lockstep it publishes, on receiving the state of a tick, all references up to the next tick.
+    In wall time it publishes at its update rate; its time begins with the first state received.
     """
 
-    def speak_for(
-        self, sampler: Sampler, subtask: str, source: str, update_rate: float, feels: bool = False
+    def set_up_source(
+        self,
+        sampler: Sampler,
+        subtask: str,
+        source: str,
+        update_rate: float,
+        uses_feedback: bool = False,
     ) -> None:
-        """Sets the node up; called once, by the constructor.
+        """Create publishers and subscriptions; called once by the constructor.
 
         Args:
-            sampler: Where the references come from.
-            subtask: Subtask that they lead.
+            sampler: Sampler of the references.
+            subtask: Name of the subtask.
             source: `human` or `autonomy`.
             update_rate: Rate of references in wall time [Hz].
-            feels: Whether the sampler waits for the subtask's feedback.
+            uses_feedback: True where the sampler needs the feedback of the subtask.
         """
-        team = self.scenario.build_team()
-        stack = self.scenario.build_stack(team)
+        team, stack = self.scenario.team, self.scenario.stack
         task = stack.subtasks[stack.names.index(subtask)]
-        self._sampler, self._feels = sampler, feels
+        self._sampler, self._uses_feedback = sampler, uses_feedback
         self._codec = SubtaskCodec(subtask, task.elements, task.axes, task.rotates)
         self._joints = JointStateCodec(team.joint_names)
         self._rate, self._update_rate = self.scenario.general.rate, update_rate
         self._announcer = Announcer(sampler, self._rate)
-        self._order, self._lead = StampOrder(), state_lead(self._rate)
-        self._began: int | None = None
+        self._stamps, self._max_lead = StampChecker(), max_stamp_lead(self._rate)
+        self._started_at: int | None = None
         self._stamp = -1
-        self._state_at = -np.inf
+        self._state_received_at = -np.inf
         self._feedback: Array = np.zeros(task.dim)
         self._sent = 0
-        self._words: list[tuple[int, bytes]] = []
+        self._pending: list[tuple[int, bytes]] = []
         topic = f"{subtask}/{source}/reference"
-        self._publish_to = self.create_publisher(MultiDOFJointTrajectory, topic, LOOP_QOS)
+        self._publisher = self.create_publisher(MultiDOFJointTrajectory, topic, LOOP_QOS)
         self.subscribe(JointState, "joint_states", self._on_state, raw=True)
-        if feels:
+        if uses_feedback:
             self.subscribe(WrenchStamped, f"{subtask}/feedback", self._on_feedback)
 
     def _on_state(self, data: bytes) -> None:
         stamp = self._joints.decode(data).stamp_ns
-        if self._order.take("joint_states", stamp, self._lead):
-            self._begin_anew(stamp)
-        self._state_at = time.monotonic()
-        if stamp == self._stamp and self._began is not None:
-            self._repeat()
+        if self._stamps.accept("joint_states", stamp, self._max_lead):
+            self._restart(stamp)
+        self._state_received_at = time.monotonic()
+        if stamp == self._stamp and self._started_at is not None:
+            self._resend()
             return
-        self._words = [(until, words) for until, words in self._words if until >= stamp]
-        if self._began is None:
-            self._began = stamp
+        self._pending = [item for item in self._pending if item[0] >= stamp]
+        if self._started_at is None:
+            self._started_at = stamp
             self._announcer.reset(seconds(stamp))
             if self.lockstep:
-                self._speak(seconds(stamp))
+                self._publish_until(seconds(stamp))
         self._stamp = stamp
-        if self.lockstep and not self._feels:
-            self._speak_ahead(stamp)
+        if self.lockstep and not self._uses_feedback:
+            self._publish_tick(stamp)
 
-    def _begin_anew(self, stamp: int) -> None:
-        """The team was started anew: what was felt and said belongs to its former life."""
-        self._order.forget()
-        self._order.note("joint_states", stamp)
-        self._began = None
-        self._words = []
+    def _restart(self, stamp: int) -> None:
+        """Discard feedback and references of before the restart of the team."""
+        self._stamps.reset()
+        self._stamps.record("joint_states", stamp)
+        self._started_at = None
+        self._pending = []
         self._feedback = np.zeros_like(self._feedback)
 
     def _on_feedback(self, message: WrenchStamped) -> None:
         stamp, force = self._codec.force(message)
         if self.lockstep and stamp > self._stamp + 2e9 / self._rate:
             raise InputError(f"stamp {seconds(stamp):.6f} s answers no state of the team")
-        self._order.take("feedback", stamp, self._lead)
+        self._stamps.accept("feedback", stamp, self._max_lead)
         self._feedback = force
-        if self.lockstep and self._began is not None:
-            self._speak_ahead(stamp)
+        if self.lockstep and self._started_at is not None:
+            self._publish_tick(stamp)
 
-    def _speak_ahead(self, stamp: int) -> None:
+    def _publish_tick(self, stamp: int) -> None:
         tick = round(seconds(stamp) * self._rate)
-        self._speak(seconds(tick_stamp(tick + 1, self._rate)))
+        self._publish_until(seconds(tick_stamp(tick + 1, self._rate)))
 
-    def _speak(self, until: float) -> None:
-        feedback = self._feedback if self._feels else None
+    def _publish_until(self, until: float) -> None:
+        feedback = self._feedback if self._uses_feedback else None
         for stamp, reference in self._announcer.announce(until, feedback):
             if reference is None:
-                words = self._codec.encode_marker(stamp)
+                data = self._codec.encode_marker(stamp)
             else:
-                words = self._encode(stamp, reference)
-            self._words.append((stamp, words))
-            self._publish_to.publish(words)
+                data = self._encode(stamp, reference)
+            self._pending.append((stamp, data))
+            self._publisher.publish(data)
 
-    def _repeat(self) -> None:
-        """Says again what holds for a state that was sent again: somebody did not hear it."""
+    def _resend(self) -> None:
+        """Publish the references for a state that was sent again, since a message was lost."""
         if not self.lockstep:
             return
-        if not self._words:  # A hand has waited for a feedback that never came.
-            self._speak(seconds(self._stamp))
+        if not self._pending:  # The feedback of this state was lost.
+            self._publish_until(seconds(self._stamp))
             return
-        for _, words in self._words:
-            self._publish_to.publish(words)
+        for _, data in self._pending:
+            self._publisher.publish(data)
 
     def _encode(self, stamp: int, reference: Reference) -> bytes:
         self._sent += 1
@@ -125,28 +129,28 @@ class SourceNode(ScenarioNode):
         )
 
     def loop(self) -> None:
-        """Wall time: one reference per update period, while the team is there."""
-        ticker = Ticker(self._update_rate)
+        """Wall time: publish one reference per update period while states are received."""
+        rate = WallRate(self._update_rate)
         timeout = self.scenario.general.state_timeout
         while self.context.ok():
-            ticker.wait()
-            began = self._began
-            if began is None or time.monotonic() - self._state_at > timeout:
+            rate.sleep()
+            started_at = self._started_at
+            if started_at is None or time.monotonic() - self._state_received_at > timeout:
                 continue
             now = self.get_clock().now().nanoseconds
-            feedback = self._feedback if self._feels else None
-            reference = self._sampler.sample(seconds(now - began), feedback)
+            feedback = self._feedback if self._uses_feedback else None
+            reference = self._sampler.sample(seconds(now - started_at), feedback)
             if reference is not None:
-                self._publish_to.publish(self._encode(now, reference))
+                self._publisher.publish(self._encode(now, reference))
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
-        """Whether the team is there, and what was sent."""
+        """Return the age of the newest state and the number of references sent."""
         values: dict[str, object] = {
             "references sent": self._sent,
-            "state age [s]": time.monotonic() - self._state_at,
+            "state age [s]": time.monotonic() - self._state_received_at,
         }
-        if self._began is None:
+        if self._started_at is None:
             return Level.WARN, "waiting for the first state of the team", values
-        if time.monotonic() - self._state_at > 1.0:
-            return Level.WARN, "no states of the team", values
+        if time.monotonic() - self._state_received_at > 1.0:
+            return Level.WARN, "no states from the team", values
         return Level.OK, "running", values

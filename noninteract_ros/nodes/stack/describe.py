@@ -7,7 +7,7 @@ from typing import Any
 import rclpy
 from rclpy.node import Node
 
-from noninteract_ros.nodes.common.descriptions import Descriptions
+from noninteract_ros.nodes.common.descriptions import RobotDescriptions
 from noninteract_ros.nodes.common.node import NAMESPACE
 
 
@@ -24,7 +24,7 @@ def described(values: Mapping[str, Any], timeout: float) -> dict[str, Any]:
     rclpy.init(signal_handler_options=rclpy.SignalHandlerOptions.ALL)
     try:
         node = Node("describe", namespace=NAMESPACE)
-        descriptions = Descriptions(node, values, lambda: None)
+        descriptions = RobotDescriptions(node, values, lambda: None)
         return descriptions.wait(lambda text, refused: None, timeout)
     finally:
         rclpy.try_shutdown()

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The program `robot_team`, the simulated team."""
+"""Node of the program `robot_team`, the simulated team."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Program `robot_team`: a simulated robot team that listens to torques."""
+"""Program `robot_team`: simulated robot team with torque inputs."""
 
 import threading
 import time
@@ -17,53 +17,52 @@ from noninteract_ros.clock import seconds, tick_stamp
 from noninteract_ros.control.references.inputs import HORIZON
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
-from noninteract_ros.nodes.common.lockstep import StampOrder
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, Ticker
+from noninteract_ros.nodes.common.lockstep import StampChecker
+from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, WallRate
 from noninteract_ros.nodes.common.program import run_program
 from noninteract_ros.nodes.common.team_status import FINISHED, PAUSED
 from noninteract_ros.nodes.messages import messages
 from noninteract_ros.nodes.messages.messages import Level
-from noninteract_ros.nodes.team.body_poses import BodyPoses
-from noninteract_ros.nodes.team.robot_ports import RobotPorts
+from noninteract_ros.nodes.team.simulated_drivers import BodyPosePublisher, SimulatedDrivers
 
-RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is sent again
+RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is published again
 
 
 class RobotTeam(ScenarioNode):
-    """Integrates (2) under the torques that answer its states.
+    """Node that integrates equation (2) under the torques that answer its states.
 
-    Lockstep: a state is stamped with simulated time, and the team steps when the command with
-    that stamp has come; with `real_time` not before its time has come too. Wall time: it steps at
-    its rate, holds the last command for `command_timeout` and then brakes.
+    In lockstep a state is stamped with simulated time, and the team steps when it receives the
+    command with that stamp; with `real_time` also not before its period has begun. In wall time
+    it steps at its rate, holds the last command for `command_timeout` and then brakes.
     """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("robot_team", **kwargs)
         general = self.scenario.general
-        team = self.scenario.build_team()
+        team = self.scenario.team
         self._team = team
-        self._simulation = self.scenario.build_simulation(team, self.scenario.build_stack(team))
-        self._telemetry = max(1, round(general.rate / general.telemetry_rate))
+        self._simulation = self.scenario.build_simulation(team, self.scenario.stack)
+        self._telemetry_period = max(1, round(general.rate / general.telemetry_rate))
         self._lock = threading.Lock()
         self._paced = self.lockstep and general.real_time
-        self._can_step = threading.Event()
+        self._step_allowed = threading.Event()
         self._paused = general.start_paused
-        self._stamp = self._stamp_before = 0
-        self._order = StampOrder()
+        self._stamp = self._previous_stamp = 0
+        self._stamps = StampChecker()
         self._sent_at = 0.0
         self._command: tuple[int, np.ndarray] | None = None
-        self._command_at = -np.inf
+        self._command_received_at = -np.inf
         self._braking = False
         self._end_tick = round(general.end_time * general.rate) if general.end_time else None
-        self._ports = RobotPorts(self, team, self._on_command)
-        self._describe()
-        self._bodies = BodyPoses(self, self._simulation)
-        self._wrenches = [
+        self._drivers = SimulatedDrivers(self, team, self._on_command)
+        self._publish_descriptions()
+        self._body_poses = BodyPosePublisher(self, self._simulation)
+        self._wrench_publishers = [
             self.create_publisher(WrenchStamped, f"{name}/external_wrench", LOOP_QOS)
             for name in team.names
         ]
-        self._put_back_to = self.create_publisher(Header, "put_back", LOOP_QOS)
-        self._clock_to = (
+        self._reset_publisher = self.create_publisher(Header, "put_back", LOOP_QOS)
+        self._clock_publisher = (
             self.create_publisher(Clock, "/clock", LOOP_QOS) if general.publish_clock else None
         )
         for robot in team.robots:
@@ -72,39 +71,39 @@ class RobotTeam(ScenarioNode):
                 WrenchStamped, f"{robot.name}/push", partial(self._on_push, robot.name, tool)
             )
         self.create_service(SetBool, "~/pause", self._on_pause)
-        self.create_service(Trigger, "~/step", self._guarded(self._step_once))
-        self.create_service(Trigger, "~/reset", self._guarded(self._reset))
+        self.create_service(Trigger, "~/step", self._locked(self._step_once))
+        self.create_service(Trigger, "~/reset", self._locked(self._reset))
         if self.lockstep:
-            self.every(RESEND_PERIOD, self._resend)
+            self.create_wall_timer(RESEND_PERIOD, self._resend)
 
-    def _describe(self) -> None:
-        """Publishes the robots' URDFs, for whoever draws them, now or later."""
+    def _publish_descriptions(self) -> None:
+        """Publish the robot descriptions as latched messages, for visualization."""
         for name, block in self.scenario.robots.items():
-            if self.descriptions.heard_on(f"{name}/robot_description"):
-                continue  # Whoever publishes it there goes on doing so.
+            if self.descriptions.is_subscribed_to(f"{name}/robot_description"):
+                continue  # Another node publishes it.
             publisher = self.create_publisher(String, f"{name}/robot_description", LATCHED_QOS)
             publisher.publish(String(data=block.description(name)))
 
-    def _on_command(self, told: int | None, effort: np.ndarray) -> None:
-        """Takes torques (n,) and the stamp [ns] of the state that they answer, where it is told.
+    def _on_command(self, answered: int | None, effort: np.ndarray) -> None:
+        """Receive torques (n,) and the stamp [ns] of the answered state.
 
-        Who tells none is believed to answer the last state.
+        Torques without a stamp answer the last state.
         """
         with self._lock:
-            stamp = self._stamp if told is None else told
-            if self.lockstep and stamp == self._stamp_before != self._stamp:
-                return  # A second answer to a state that was sent twice.
+            stamp = self._stamp if answered is None else answered
+            if self.lockstep and stamp == self._previous_stamp != self._stamp:
+                return  # A second answer to a state that was published twice.
             self._check_command(stamp)
-            self._command, self._command_at = (stamp, effort), time.monotonic()
+            self._command, self._command_received_at = (stamp, effort), time.monotonic()
             if self.lockstep and not self._paused:
-                self._step_on(effort)
+                self._step_when_due(effort)
 
     def _check_command(self, stamp: int) -> None:
-        """Refuses a command for a state that was not sent, or for one that is past."""
+        """Raise an InputError for a command that answers no state, in lockstep not the last."""
         if stamp > self._stamp or (self.lockstep and stamp != self._stamp):
-            text = f"the last state is of {seconds(self._stamp):.6f} s"
+            text = f"the last state has the stamp {seconds(self._stamp):.6f} s"
             raise InputError(f"stamp {seconds(stamp):.6f} s answers no state: {text}")
-        self._order.take("joint_commands", stamp)
+        self._stamps.accept("joint_commands", stamp)
 
     def _on_push(self, robot: str, tool_frame: str, message: WrenchStamped) -> None:
         stamp, axes, wrench = messages.push(message, tool_frame)
@@ -115,29 +114,29 @@ class RobotTeam(ScenarioNode):
             self._simulation.push(robot, wrench, axes == "tool", timeout)
 
     def _check_push(self, robot: str, stamp: int) -> None:
-        """Refuses a push with a stamp that goes back, or is ahead of the team's time."""
+        """Raise an InputError for a stamp that goes back or is ahead of the time of the team."""
         if not self.lockstep:
-            self._order.take(robot, stamp, HORIZON)
+            self._stamps.accept(robot, stamp, HORIZON)
         elif stamp > self._stamp + 1e9 * HORIZON:
-            text = f"is ahead of the team's time {seconds(self._stamp):.6f} s"
+            text = f"is ahead of the time of the team, {seconds(self._stamp):.6f} s"
             raise InputError(f"stamp {seconds(stamp):.6f} s {text}")
         else:
-            self._order.take(robot, stamp)
+            self._stamps.accept(robot, stamp)
 
-    def _step_on(self, torque: np.ndarray) -> None:
-        """Lockstep: steps under the command that has come, or has the loop do it in time."""
+    def _step_when_due(self, torque: np.ndarray) -> None:
+        """Lockstep: step under the received command, or let the loop do so when it is due."""
         if self._paced:
-            self._can_step.set()
+            self._step_allowed.set()
         else:
             self._advance(torque)
 
     def _advance(self, torque: np.ndarray | None) -> None:
-        """One tick, then the state that follows."""
+        """Simulate one tick and publish the next state."""
         if self._finished():
             return
         simulation = self._simulation
         if torque is not None:
-            torque = self._ports.applied(torque, simulation.q, simulation.v)
+            torque = self._drivers.applied(torque, simulation.q, simulation.v)
         simulation.step(torque)
         self._command = self._command if not self.lockstep else None
         self._publish()
@@ -146,7 +145,7 @@ class RobotTeam(ScenarioNode):
         return self._end_tick is not None and self._simulation.tick >= self._end_tick
 
     def _next_stamp(self) -> int:
-        """Stamp of a state that is published now [ns]."""
+        """Return the stamp of a state that is published now [ns]."""
         if self.lockstep:
             return tick_stamp(self._simulation.tick, self._simulation.rate)
         return self.get_clock().now().nanoseconds
@@ -154,24 +153,24 @@ class RobotTeam(ScenarioNode):
     def _publish(self) -> None:
         simulation, stamp = self._simulation, self._next_stamp()
         if stamp != self._stamp:
-            self._stamp_before, self._stamp = self._stamp, stamp
+            self._previous_stamp, self._stamp = self._stamp, stamp
         self._sent_at = time.monotonic()
-        if self._clock_to is not None:
+        if self._clock_publisher is not None:
             now = messages.to_stamp(tick_stamp(simulation.tick, simulation.rate))
-            self._clock_to.publish(Clock(clock=now))
-        # Wrenches go first: whoever has the state has what acted on it.
-        if simulation.tick % self._telemetry == 0:
+            self._clock_publisher.publish(Clock(clock=now))
+        # Wrenches are published first, so that they arrive before the state they belong to.
+        if simulation.tick % self._telemetry_period == 0:
             for publisher, wrench in zip(
-                self._wrenches, simulation.external_wrenches(), strict=True
+                self._wrench_publishers, simulation.external_wrenches(), strict=True
             ):
                 publisher.publish(messages.to_wrench_stamped(self._stamp, wrench))
-            self._bodies.publish(self._stamp)
+            self._body_poses.publish(self._stamp)
         positions = self._team.joints_from_configuration(simulation.q)
-        told = (positions, simulation.v, simulation.torque)
-        self._ports.tell(self._stamp, simulation.tick, told)
+        arrays = (positions, simulation.v, simulation.torque)
+        self._drivers.publish(self._stamp, simulation.tick, arrays)
 
     def _resend(self) -> None:
-        """Sends an unanswered state again: the first one, or one whose answer was lost."""
+        """Publish an unanswered state again: the first one, or one whose answer was lost."""
         with self._lock:
             waiting = time.monotonic() - self._sent_at > RESEND_PERIOD
             idle = self._paused or self._finished()
@@ -180,36 +179,36 @@ class RobotTeam(ScenarioNode):
 
     @property
     def has_loop(self) -> bool:
-        """In wall time, and in lockstep that keeps to it."""
+        """True in wall time, and in lockstep with `real_time`."""
         return not self.lockstep or self._paced
 
     def loop(self) -> None:
-        """Steps at the rate of the scenario in wall time."""
-        ticker = Ticker(self._simulation.rate)
+        """Step at the rate of the scenario in wall time."""
+        rate = WallRate(self._simulation.rate)
         if self._paced:
-            self._loop_paced(ticker)
+            self._loop_paced(rate)
             return
         timeout = self.scenario.general.command_timeout
         while self.context.ok():
-            ticker.wait()
+            rate.sleep()
             with self._lock:
-                fresh = time.monotonic() - self._command_at <= timeout
+                fresh = time.monotonic() - self._command_received_at <= timeout
                 command = self._command if fresh else None
                 self._braking = command is None
                 if not self._paused:
                     self._advance(command[1] if command else None)
 
-    def _loop_paced(self, ticker: Ticker) -> None:
-        """Steps when the command has come and the period has begun, whichever is later."""
+    def _loop_paced(self, rate: WallRate) -> None:
+        """Step once the command is received and the period has begun."""
         while self.context.ok():
-            ticker.wait()
-            self._can_step.wait(RESEND_PERIOD)
+            rate.sleep()
+            self._step_allowed.wait(RESEND_PERIOD)
             with self._lock:
-                self._can_step.clear()
+                self._step_allowed.clear()
                 if self._command is not None and not self._paused:
                     self._advance(self._command[1])
 
-    def _guarded(self, action: Callable[[], tuple[bool, str]]) -> Callable[[Any, Any], Any]:
+    def _locked(self, action: Callable[[], tuple[bool, str]]) -> Callable[[Any, Any], Any]:
         def serve(_: Any, response: Any) -> Any:
             with self._lock:
                 response.success, response.message = action()
@@ -222,7 +221,7 @@ class RobotTeam(ScenarioNode):
             self._paused = request.data
             if self.lockstep and not self._paused:
                 if self._command is not None:
-                    self._step_on(self._command[1])
+                    self._step_when_due(self._command[1])
                 else:
                     self._publish()
             response.success = True
@@ -234,22 +233,22 @@ class RobotTeam(ScenarioNode):
             return False, "pause the team first"
         if self._command is None and self.lockstep:
             self._publish()
-            return False, "no command has answered the state yet; it was sent again"
+            return False, "no command has answered the state; it was published again"
         self._advance(self._command[1] if self._command else None)
-        return True, f"at {self._simulation.now:.6f} s"
+        return True, f"stepped to {self._simulation.now:.6f} s"
 
     def _reset(self) -> tuple[bool, str]:
         self._simulation.reset()
-        # Time goes on, so that no stamp goes back.
+        # The time goes on, so that no stamp goes back.
         self._simulation.tick += 1
         self._command = None
-        self._put_back_to.publish(Header(stamp=messages.to_stamp(self._next_stamp())))
+        self._reset_publisher.publish(Header(stamp=messages.to_stamp(self._next_stamp())))
         self._publish()
-        return True, "at the initial state"
+        return True, "reset to the initial state"
 
     def status(self) -> tuple[Level, str, dict[str, object]]:
-        """State machine, time and the age of the last command."""
-        age = time.monotonic() - self._command_at
+        """Return the state machine, the time and the age of the last command."""
+        age = time.monotonic() - self._command_received_at
         values: dict[str, object] = {
             "time [s]": self._simulation.now,
             "ticks": self._simulation.tick,
@@ -260,17 +259,17 @@ class RobotTeam(ScenarioNode):
             return Level.OK, FINISHED, values
         if self._paused:
             return Level.OK, PAUSED, values
-        if self._command_at == -np.inf:
+        if self._command_received_at == -np.inf:
             return Level.WARN, "waiting for the first command", values
         if self.lockstep and age > 2 * RESEND_PERIOD:
             return Level.WARN, "waiting for the command that answers the state", values
         if self._braking:
-            return Level.ERROR, "braking: no fresh command", values
-        if silent := self._ports.silent():
-            return Level.ERROR, f"braking {', '.join(silent)}: no fresh command", values
+            return Level.ERROR, "braking: command timeout", values
+        if timed_out := self._drivers.timed_out():
+            return Level.ERROR, f"braking {', '.join(timed_out)}: command timeout", values
         return Level.OK, "running", values
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point."""
+    """Run the program."""
     return run_program(RobotTeam, arguments)

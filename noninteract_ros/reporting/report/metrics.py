@@ -216,9 +216,9 @@ def diagnostics_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]
         node["worst_level"] = LEVELS[max(level, LEVELS.index(node["worst_level"]))]
         node["last_level"], node["last_message"] = LEVELS[level], status["message"]
         values = status["values"]
-        node["refused_inputs"] = int(values.get("refused inputs", node["refused_inputs"]))
-        if "last refusal" in values:
-            node["last_refusal"] = values["last refusal"]
+        node["refused_inputs"] = int(values.get("rejected inputs", node["refused_inputs"]))
+        if "last rejection" in values:
+            node["last_refusal"] = values["last rejection"]
         lost = int(values["lost"]) if "lost" in values else lost
     reason = "the recorder did not say"
     check = (

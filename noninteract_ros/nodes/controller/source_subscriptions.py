@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that a source can send to a subtask, as the controller takes it."""
+"""Subscriptions of the controller to the inputs of a source."""
 
 from collections.abc import Callable
 from functools import partial
@@ -14,46 +14,46 @@ from noninteract_ros.nodes.common.node import ScenarioNode
 from noninteract_ros.nodes.messages.messages import Marker, ParsedReference, SubtaskCodec
 from noninteract_ros.subtasks.reference import Reference
 
-Parsed = tuple[int, MotionInput | Force | None]
+Input = tuple[int, MotionInput | Force | None]  # Stamp [ns], input; None for a marker.
 
 
-def listen(
+def subscribe_to_source(
     node: ScenarioNode,
     codec: SubtaskCodec,
     source: str,
-    take: Callable[[str, str, str, Parsed], None],
+    callback: Callable[[str, str, str, Input], None],
 ) -> None:
-    """Subscribes to everything that one source can send to one subtask.
+    """Subscribe to all inputs of one source to one subtask.
 
     Args:
-        node: The controller's node.
+        node: Controller node.
         codec: Messages of the subtask.
-        source: The source.
-        take: Takes topic, subtask, source, and stamp [ns] with what is asked for, if anything.
+        source: Name of the source.
+        callback: Called with topic, subtask, source and input.
     """
     prefix = f"{codec.name}/{source}"
 
-    def on_message(kind: str, parse: Callable[[Any], Parsed], message: Any) -> None:
-        take(f"{prefix}/{kind}", codec.name, source, parse(message))
+    def on_message(kind: str, parse: Callable[[Any], Input], message: Any) -> None:
+        callback(f"{prefix}/{kind}", codec.name, source, parse(message))
 
-    def target(message: PoseStamped) -> Parsed:
+    def target(message: PoseStamped) -> Input:
         stamp, position = codec.target(message)
         return stamp, Target(position, np.zeros(codec.layout.dim))
 
-    def rate(message: TwistStamped) -> Parsed:
+    def rate(message: TwistStamped) -> Input:
         stamp, velocity = codec.rate(message)
         return stamp, Rate(velocity)
 
-    def force(message: WrenchStamped) -> Parsed:
-        stamp, wanted = codec.force(message)
-        return stamp, Force(wanted)
+    def force(message: WrenchStamped) -> Input:
+        stamp, value = codec.force(message)
+        return stamp, Force(value)
 
-    def reference(data: bytes) -> Parsed:
+    def reference(data: bytes) -> Input:
         return _reference(codec.decode(data), codec.layout.dim)
 
     on_reference = partial(on_message, "reference", reference)
     node.subscribe(MultiDOFJointTrajectory, f"{prefix}/reference", on_reference, raw=True)
-    kinds: tuple[tuple[type, str, Callable[[Any], Parsed]], ...] = (
+    kinds: tuple[tuple[type, str, Callable[[Any], Input]], ...] = (
         (PoseStamped, "target_pose", target),
         (TwistStamped, "target_twist", rate),
         (WrenchStamped, "wrench", force),
@@ -63,9 +63,9 @@ def listen(
 
 
 def _reference(parsed: ParsedReference | Marker, dim: int) -> tuple[int, MotionInput | None]:
-    """What a source asks for: a motion, a set-point where it gives no velocity, or nothing.
+    """Return a motion, a set-point if the message has no velocity, or None for a marker.
 
-    A motion without acceleration is followed by its position and velocity alone.
+    A motion without acceleration is tracked by position and velocity alone.
     """
     if isinstance(parsed, Marker):
         return parsed.stamp_ns, None
