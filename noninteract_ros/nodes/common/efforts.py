@@ -94,16 +94,16 @@ class EffortPublishers:
         self._timeout, self._fade_time = general.state_timeout, general.transition_time
         self._outputs: list[_Output] = []
         for robot, joints in zip(team.robots, team.velocity_slices, strict=True):
-            wiring = node.scenario.robots[robot.name].topics
-            if wiring.effort_topic:
+            topics = node.scenario.robots[robot.name].topics
+            if topics.effort_topic:
                 # Only the newest torques may be applied, so the queue holds one message.
-                publisher = node.create_publisher(Float64MultiArray, wiring.effort_topic, 1)
-                codec = EffortCodec(wiring.effort_order(list(robot.model.names)[1:]))
+                publisher = node.create_publisher(Float64MultiArray, topics.effort_topic, 1)
+                codec = EffortCodec(topics.effort_order(list(robot.model.names)[1:]))
                 output = _Output(
                     publisher=publisher,
                     codec=codec,
                     joints=joints,
-                    compensates_gravity=wiring.gravity_compensated,
+                    compensates_gravity=topics.gravity_compensated,
                 )
                 self._outputs.append(output)
         self._last: tuple[int, Array, Array] | None = None

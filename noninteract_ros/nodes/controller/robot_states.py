@@ -133,9 +133,9 @@ class RobotStates:
         self.late: tuple[str, ...] = ()
         qos = LOOP_QOS if node.lockstep else DRIVER_QOS
         for robot, joints in zip(team.robots, team.velocity_slices, strict=True):
-            wiring = node.scenario.robots[robot.name].topics
-            codec = DriverStateCodec(wiring.driver_joints(list(robot.model.names)[1:]))
-            topic = wiring.joint_states_topic
+            topics = node.scenario.robots[robot.name].topics
+            codec = DriverStateCodec(topics.driver_joints(list(robot.model.names)[1:]))
+            topic = topics.joint_states_topic
             callback = partial(self._on_message, topic, codec, joints.start)
             node.subscribe(JointState, topic, callback, raw=True, qos=qos)
 

@@ -66,7 +66,7 @@ class _StateOutput:
 
 
 class SimulatedDrivers:
-    """Publishers of joint states and subscriptions to torques, on the topics of the wiring.
+    """Publishers of joint states and subscriptions to torques, on the topics of the topics.
 
     Torques are passed on once every robot has received its own; in lockstep, once all of them
     answer the same state.
@@ -91,10 +91,10 @@ class SimulatedDrivers:
             self._outputs.append(output)
         shared = _CommandInput([], [])
         for index, robot in enumerate(team.robots):
-            wiring = node.scenario.robots[robot.name].topics
-            if wiring.joint_states_topic:
+            topics = node.scenario.robots[robot.name].topics
+            if topics.joint_states_topic:
                 self._add_output(index)
-            if wiring.effort_topic:
+            if topics.effort_topic:
                 self._add_input(index)
             else:
                 part = team.velocity_slices[index]
@@ -108,11 +108,11 @@ class SimulatedDrivers:
 
     def _add_output(self, index: int) -> None:
         general, robot = self._node.scenario.general, self._team.robots[index]
-        wiring = self._node.scenario.robots[robot.name].topics
-        publisher = self._node.create_publisher(JointState, wiring.joint_states_topic, LOOP_QOS)
-        codec = JointStateCodec(wiring.driver_joints(list(robot.model.names)[1:]))
-        own_rate = wiring.joint_states_rate and not self._node.lockstep
-        period = max(1, round(general.rate / wiring.joint_states_rate)) if own_rate else 1
+        topics = self._node.scenario.robots[robot.name].topics
+        publisher = self._node.create_publisher(JointState, topics.joint_states_topic, LOOP_QOS)
+        codec = JointStateCodec(topics.driver_joints(list(robot.model.names)[1:]))
+        own_rate = topics.joint_states_rate and not self._node.lockstep
+        period = max(1, round(general.rate / topics.joint_states_rate)) if own_rate else 1
         # Robots of one rate publish at different ticks, as real ones do.
         output = _StateOutput(
             joints=self._team.velocity_slices[index],
@@ -125,14 +125,14 @@ class SimulatedDrivers:
 
     def _add_input(self, index: int) -> None:
         robot, part = self._team.robots[index], self._team.velocity_slices[index]
-        wiring = self._node.scenario.robots[robot.name].topics
+        topics = self._node.scenario.robots[robot.name].topics
         command_input = _CommandInput(
-            [robot.name], list(range(part.start, part.stop)), wiring.gravity_compensated
+            [robot.name], list(range(part.start, part.stop)), topics.gravity_compensated
         )
-        codec = EffortCodec(wiring.effort_order(list(robot.model.names)[1:]))
+        codec = EffortCodec(topics.effort_order(list(robot.model.names)[1:]))
         self._inputs.append(command_input)
         callback = partial(self._on_efforts, command_input, codec)
-        self._node.subscribe(Float64MultiArray, wiring.effort_topic, callback)
+        self._node.subscribe(Float64MultiArray, topics.effort_topic, callback)
 
     def _on_commands(
         self, command_input: _CommandInput, codec: JointStateCodec, data: bytes
