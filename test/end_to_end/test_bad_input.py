@@ -79,7 +79,7 @@ def reference_kinds(element: str) -> dict[str, Spoil]:
         "x of .* is nan": setting("points.0.transforms.0.translation.x", math.nan),
         "velocity y of .* is inf": setting("points.0.velocities.0.linear.y", math.inf),
         "acceleration angular z": setting("points.0.accelerations.0.angular.z", math.nan),
-        "no unit quaternion": setting("points.0.transforms.0.rotation.w", 0.0),
+        "not a unit quaternion": setting("points.0.transforms.0.rotation.w", 0.0),
     }
     return FRAME | STAMPS | points
 
@@ -89,7 +89,7 @@ POSE_KINDS = (
     | STAMPS
     | {
         "y is inf": setting("pose.position.y", math.inf),
-        "no unit quaternion": setting("pose.orientation.w", 2.0),
+        "not a unit quaternion": setting("pose.orientation.w", 2.0),
         "rotation x is nan": setting("pose.orientation.x", math.nan),
     }
 )

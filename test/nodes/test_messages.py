@@ -150,9 +150,9 @@ BAD_REFERENCES = [
     ("points.0.velocities.1.linear.x", -INF, "velocity x of robot_2-robot_3 is -inf"),
     ("points.0.velocities.0.angular.z", NAN, "velocity angular z of robot_1-robot_2 is nan"),
     ("points.0.accelerations.1.linear.y", NAN, "acceleration y of robot_2-robot_3 is nan"),
-    ("points.0.transforms.1.rotation.w", 0.0, "rotation of robot_2-robot_3 is no unit quat"),
-    ("points.0.transforms.0.rotation.x", 0.1, "rotation of robot_1-robot_2 is no unit quat"),
-    ("points.0.transforms.0.rotation.x", 1e8, "rotation of robot_1-robot_2 is no unit quat"),
+    ("points.0.transforms.1.rotation.w", 0.0, "rotation of robot_2-robot_3 is not a unit quat"),
+    ("points.0.transforms.0.rotation.x", 0.1, "rotation of robot_1-robot_2 is not a unit quat"),
+    ("points.0.transforms.0.rotation.x", 1e8, "rotation of robot_1-robot_2 is not a unit quat"),
     ("points.0.transforms.0.translation.x", 1e300, "x of robot_1-robot_2 is 1e+300"),
     ("header.frame_id", "map", "frame 'map' is unknown, allowed: world"),
     ("header.stamp.sec", -1, "stamp -1 s 7 ns is not a time"),
@@ -221,7 +221,7 @@ def test_bad_single_inputs_are_refused(read, kind, linear, angular):
 
 @pytest.mark.parametrize(("field", "value"), [("w", 0.0), ("w", 0.99), ("y", 0.1)])
 def test_a_pose_whose_quaternion_is_not_one_is_refused(field, value):
-    with pytest.raises(InputError, match="rotation of cooperative is no unit quaternion"):
+    with pytest.raises(InputError, match="rotation of cooperative is not a unit quaternion"):
         ONE.target(stamped(PoseStamped, f"pose.orientation.{field}", value))
 
 

@@ -66,7 +66,7 @@ def test_quaternions_are_brought_to_unit_length():
     found = POSE.decode(data).position
     assert np.linalg.norm(found[3:]) == pytest.approx(1.0, abs=1e-15)
     data = POSE.encode(STAMP, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.6, 0.9]))
-    with pytest.raises(InputError, match="rotation of cooperative is no unit quaternion"):
+    with pytest.raises(InputError, match="rotation of cooperative is not a unit quaternion"):
         POSE.decode(data)
 
 

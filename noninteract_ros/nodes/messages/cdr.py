@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages of fixed shape, read and written in place in their serialized (CDR) form.
+"""Messages of fixed shape, read and written in their serialized (CDR) form.
 
-Names, sizes and frames of a run do not change, so neither do the bytes between its numbers: numpy
-fetches the numbers at once, which for a message of 29 elements is about a hundred times cheaper
-than message objects. Publishers take these bytes; subscriptions with `raw=True` deliver them.
+Names, sizes and frames do not change during a run, and neither do the bytes between the numbers.
+numpy then reads all numbers at once, which for a message with 29 elements is about a hundred times
+cheaper than message objects. Publishers accept serialized bytes; subscriptions with `raw=True`
+deliver them.
 """
 
 import struct
@@ -19,7 +20,7 @@ from noninteract_ros.errors import InputError, one_of
 
 Message = TypeVar("Message")
 SECOND = 10**9
-LARGEST = 1e9  # in any unit
+MAX_MAGNITUDE = 1e9  # in any unit
 QUANTITIES = ("position", "velocity", "effort")
 ENCAPSULATION = b"\x00\x01\x00\x00"  # plain CDR, little-endian, no options
 STAMP = struct.Struct("<iI")
@@ -27,10 +28,10 @@ FORMATS = {"int32": "<i", "uint32": "<I", "double": "<d"}
 
 
 def join_stamp(sec: int, nanosec: int) -> int:
-    """Stamp in nanoseconds from the two numbers of a message.
+    """Return a stamp in nanoseconds.
 
     Raises:
-        InputError: The stamp is negative, or its nanoseconds make more than a second.
+        InputError: The stamp is negative, or its nanoseconds exceed one second.
     """
     if sec < 0 or not 0 <= nanosec < SECOND:
         raise InputError(f"stamp {sec} s {nanosec} ns is not a time")
@@ -38,10 +39,10 @@ def join_stamp(sec: int, nanosec: int) -> int:
 
 
 def deserialize(data: bytes, message_type: type[Message]) -> Message:
-    """The message object of serialized bytes.
+    """Return the message object of serialized bytes.
 
     Raises:
-        InputError: The bytes are no such message.
+        InputError: The bytes are not a message of this type.
     """
     try:
         message: Message = deserialize_message(bytes(data), message_type)
@@ -51,26 +52,31 @@ def deserialize(data: bytes, message_type: type[Message]) -> Message:
 
 
 def check_finite(values: Array, label: Callable[[int], str]) -> None:
-    """Refuses NaN, infinity, and numbers that no robot means but that would overflow torques.
+    """Reject NaN, infinity, and finite numbers so large that torques would overflow.
 
     Args:
-        values: Numbers (n,).
-        label: Says in words what the i-th number is.
+        values: Numbers, shape (n,).
+        label: Returns the name of the i-th number.
 
     Raises:
-        InputError: A number is not finite or beyond `LARGEST`; the text has its label.
+        InputError: A number is not finite or exceeds `MAX_MAGNITUDE`; the text has its label.
     """
-    sane = np.abs(values) <= LARGEST
-    if not sane.all():
-        first = int(sane.argmin())
+    valid = np.abs(values) <= MAX_MAGNITUDE
+    if not valid.all():
+        first = int(valid.argmin())
         raise InputError(f"{label(first)} is {values[first]}")
 
 
 def order_by_name(found: Sequence[str], names: Sequence[str], what: str) -> list[int]:
-    """Where each of `names` stands in `found`, which must hold the same names in any order.
+    """Return the index in `found` of each of `names`, which must be the same set of names.
+
+    Args:
+        found: Received names.
+        names: Expected names.
+        what: Kind of the names, for error texts.
 
     Raises:
-        InputError: A name is unknown, missing or given twice; the text says which `what` it is.
+        InputError: A name is unknown, missing or given twice.
     """
     if tuple(found) == tuple(names):
         return list(range(len(names)))
@@ -91,14 +97,14 @@ def order_by_name(found: Sequence[str], names: Sequence[str], what: str) -> list
 
 
 class CdrTemplate:
-    """The bytes of one message whose shape and texts stay the same; only stamp and numbers change.
+    """Serialized message of fixed shape and strings, in which only stamp and numbers change.
 
-    Its numbers are all float64 fields, in the order of the message definition. An instance writes
-    into a buffer of its own: it serves one thread.
+    The numbers are all float64 fields, in the order of the message definition. An instance writes
+    into its own buffer, so it must be used by one thread only.
 
     Args:
-        message: Any message. The stamp changes only where it begins with a header.
-        written: Which of the numbers `encode` sets; all, if None. The others stay as they are.
+        message: Message of any type. The stamp changes only if the message has a header.
+        written: Indices of the numbers set by `encode`; None for all. The others keep their value.
     """
 
     def __init__(self, message: Any, written: Sequence[int] | None = None) -> None:
@@ -109,8 +115,8 @@ class CdrTemplate:
             layout.constant[: STAMP.size] = bytes(STAMP.size)
         self._end = 4 + len(layout.data)
         self._room = -(-len(layout.data) // 8) * 8
-        # Numbers are aligned to 8 bytes from the end of the encapsulation; four bytes before it
-        # put them on aligned addresses of this buffer, which numpy reads three times faster.
+        # Numbers are aligned to 8 bytes from the end of the encapsulation. Four leading bytes put
+        # them on aligned addresses of this buffer, which numpy reads three times faster.
         self._buffer = bytearray(bytes(4) + ENCAPSULATION + layout.data.ljust(self._room, b"\0"))
         self._payload = memoryview(self._buffer)[4 : 4 + self._end]
         self._floats = np.frombuffer(self._buffer, "<f8", offset=8)
@@ -120,14 +126,14 @@ class CdrTemplate:
         self._written = self._places if written is None else self._places[list(written)]
 
     def encode(self, values: Array, stamp_ns: int | None = None) -> bytes:
-        """The bytes of the message with these numbers.
+        """Return the serialized message with these numbers.
 
         Args:
-            values: The numbers that are written (len(written),).
-            stamp_ns: Stamp of the header [ns]; kept as it is, if None.
+            values: Written numbers, shape (len(written),).
+            stamp_ns: Stamp of the header [ns]; None to keep it.
 
         Raises:
-            ValueError: There are more or fewer numbers than places.
+            ValueError: The number of values is wrong.
         """
         if values.shape != self._written.shape:
             raise ValueError(f"{values.shape} numbers for {self._written.shape} places")
@@ -137,9 +143,9 @@ class CdrTemplate:
         return bytes(self._payload)
 
     def decode(self, data: bytes) -> tuple[int, Array] | None:
-        """Stamp [ns] (0 without a header) and all numbers of a message of this very shape.
+        """Return the stamp [ns] (0 without a header) and all numbers of a message of this shape.
 
-        None where any other byte differs: that message has to be deserialized.
+        Return None if any other byte differs; the message must then be deserialized.
 
         Raises:
             InputError: The stamp is not a time.
@@ -154,14 +160,14 @@ class CdrTemplate:
 
 
 class _Layout:
-    """Serializes a message by its definition, and notes where the float64 fields and the gaps are.
+    """Serialized layout of a message: float64 fields, constant bytes and padding.
 
-    The gaps matter: the middleware leaves whatever was in memory there.
+    The middleware does not clear padding, so it must be ignored in comparisons.
 
     Attributes:
         data: Serialized bytes, without encapsulation.
-        constant: 0xFF for each byte of `data` that belongs to a text, a size or a whole number.
-        floats: Where the float64 fields begin, in units of 8 bytes.
+        constant: 0xFF for each byte of `data` in a string, a size or an integer, else 0.
+        floats: Offsets of the float64 fields, in units of 8 bytes.
     """
 
     def __init__(self) -> None:
@@ -169,7 +175,7 @@ class _Layout:
         self.floats: list[int] = []
 
     def add_message(self, message: Any) -> None:
-        """Appends all fields of a message."""
+        """Append all fields of a message."""
         for name, kind in message.get_fields_and_field_types().items():
             self._add(getattr(message, name), kind)
 
@@ -198,13 +204,13 @@ class _Layout:
 
 
 class JointArrays(NamedTuple):
-    """A sensor_msgs/JointState in the joint order of its codec.
+    """Arrays of a sensor_msgs/JointState in the joint order of its codec.
 
     Attributes:
         stamp_ns: Stamp [ns].
-        position: (n,) [m or rad], None where the message has none.
-        velocity: (n,) [m/s or rad/s], None where the message has none.
-        effort: (n,) [N or N m], None where the message has none.
+        position: Positions, shape (n,) [m or rad], or None.
+        velocity: Velocities, shape (n,) [m/s or rad/s], or None.
+        effort: Efforts, shape (n,) [N or N m], or None.
     """
 
     stamp_ns: int
@@ -214,12 +220,12 @@ class JointArrays(NamedTuple):
 
 
 class JointStateCodec:
-    """sensor_msgs/JointState of joints whose names are known, to bytes and back.
+    """Encoder and decoder of sensor_msgs/JointState for known joints.
 
     Args:
-        names: The n joints, in the order of the arrays.
-        frame_id: What encoded messages carry in the header; ignored in received ones.
-        required: Which of position, velocity and effort a received message must have.
+        names: Names of the n joints, in the order of the arrays.
+        frame_id: Frame in the header of encoded messages; ignored in received ones.
+        required: Quantities that a received message must have: position, velocity, effort.
     """
 
     def __init__(
@@ -228,7 +234,7 @@ class JointStateCodec:
         self.names = tuple(names)
         self._frame_id, self._required = frame_id, tuple(required)
         self._templates: dict[tuple[str, ...], CdrTemplate] = {}
-        for given in (QUANTITIES, ("effort",)):  # what robots and controllers send
+        for given in (QUANTITIES, ("effort",)):  # as robots and controllers publish
             self._templates[given] = self._template(given)
 
     def encode(
@@ -238,7 +244,7 @@ class JointStateCodec:
         velocity: Array | None = None,
         effort: Array | None = None,
     ) -> bytes:
-        """Serialized message with those arrays (n,) that are given."""
+        """Return the serialized message with the given arrays, shape (n,)."""
         arrays = dict(zip(QUANTITIES, (position, velocity, effort), strict=True))
         given = tuple(name for name, array in arrays.items() if array is not None)
         if given not in self._templates:
@@ -248,11 +254,12 @@ class JointStateCodec:
         return self._templates[given].encode(joined, stamp_ns)
 
     def decode(self, data: bytes) -> JointArrays:
-        """Arrays of a serialized message with these joints, in any order.
+        """Return the arrays of a serialized message with these joints in any order.
 
         Raises:
-            InputError: The bytes are no JointState, a joint is unknown, missing or given twice, an
-                array has a wrong size or lacks, a number is not finite, the stamp is not a time.
+            InputError: The bytes are not a JointState, a joint is unknown, missing or given twice,
+                an array has a wrong size or is missing, a number is not finite, or the stamp is
+                not a time.
         """
         for given, template in self._templates.items():
             found = template.decode(data)
@@ -261,7 +268,7 @@ class JointStateCodec:
         return self.from_message(deserialize(data, JointState))
 
     def from_message(self, message: JointState) -> JointArrays:
-        """As `decode`, for a message object."""
+        """Return the arrays of a message object; see `decode`."""
         stamp = join_stamp(message.header.stamp.sec, message.header.stamp.nanosec)
         order = order_by_name(message.name, self.names, "joint")
         given, arrays = [], [np.zeros(0)]

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages to arrays and back: the one place that knows both.
+"""Conversion between messages and arrays.
 
-Everything that comes in is checked whole; what is refused raises an `InputError` that names the
-thing. `encode` methods return serialized bytes, which publishers take as they are. An empty
-`frame_id` means the world.
+Received messages are checked completely; an invalid one raises an `InputError` that names the
+offending field. `encode` methods return serialized bytes. An empty `frame_id` is the world frame.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -34,9 +33,9 @@ WRENCH = ("force x", "force y", "force z", "torque x", "torque y", "torque z")
 
 @dataclass(frozen=True, slots=True)
 class ParsedReference:
-    """What a source asks of a subtask: stamp [ns], value (size,), velocity, acceleration (dim,).
+    """Reference of a source: stamp [ns], value (size,), velocity and acceleration (dim,) or None.
 
-    Velocity and acceleration are None where the message has none. Quaternions are unit ones.
+    Quaternions have unit length.
     """
 
     stamp_ns: int
@@ -47,49 +46,51 @@ class ParsedReference:
 
 @dataclass(frozen=True, slots=True)
 class Marker:
-    """A source says that nothing new comes up to and including this stamp [ns]."""
+    """Marker of a source that no reference follows up to and including this stamp [ns]."""
 
     stamp_ns: int
 
 
 def stamp_ns(stamp: Time) -> int:
-    """Nanoseconds of a stamp; raises InputError where it is not a time."""
+    """Return the nanoseconds of a stamp; raise an InputError if it is not a time."""
     return cdr.join_stamp(stamp.sec, stamp.nanosec)
 
 
 def to_stamp(time_ns: int) -> Time:
-    """Stamp of a time [ns]."""
+    """Return the stamp of a time [ns]."""
     sec, nanosec = divmod(time_ns, cdr.SECOND)
     return Time(sec=sec, nanosec=nanosec)
 
 
 def check_frame(frame_id: str, *allowed: str) -> None:
-    """Raises InputError, with the allowed frames, where a frame is none of them nor empty."""
+    """Raise an InputError unless the frame is empty or one of the allowed frames."""
     if frame_id and frame_id not in allowed:
         raise InputError(f"frame {frame_id[:80]!r} is unknown, allowed: {' | '.join(allowed)}")
 
 
 def check_rotations(rotations: Array, names: Sequence[str]) -> None:
-    """Raises InputError, with its name, where one of the quaternions (n, 4) is not a unit one."""
+    """Raise an InputError unless all quaternions, shape (n, 4), have unit length."""
     with np.errstate(over="ignore"):
         lengths = np.sqrt(np.einsum("ij,ij->i", rotations, rotations))
     wrong = np.abs(lengths - 1.0) > UNIT_TOLERANCE
     if wrong.any():
         first = int(wrong.argmax())
         length = lengths[first]
-        raise InputError(f"rotation of {names[first]} is no unit quaternion (length {length:.3g})")
+        raise InputError(
+            f"rotation of {names[first]} is not a unit quaternion (length {length:.3g})"
+        )
 
 
 def flat(*parts: Any) -> Array:
-    """The numbers of vectors (x, y, z) and quaternions (x, y, z, w), one after the other."""
+    """Return the concatenated numbers of vectors (x, y, z) and quaternions (x, y, z, w)."""
     return np.array([getattr(part, axis) for part in parts for axis in FIELDS[type(part)]])
 
 
 def push(message: geometry.WrenchStamped, tool_frame: str) -> tuple[int, str, Array]:
-    """Stamp [ns], axes ("world" or "tool") and wrench [N, N m] (6,) on a robot at its tool point.
+    """Return stamp [ns], axes ("world" or "tool") and wrench at the tool, shape (6,) [N, N m].
 
     Raises:
-        InputError: The frame is neither, a number is not finite, the stamp is not a time.
+        InputError: The frame is neither, a number is not finite, or the stamp is not a time.
     """
     check_frame(message.header.frame_id, WORLD, tool_frame)
     axes = "tool" if message.header.frame_id == tool_frame else WORLD
@@ -99,14 +100,14 @@ def push(message: geometry.WrenchStamped, tool_frame: str) -> tuple[int, str, Ar
 
 
 def external_wrench(message: geometry.WrenchStamped) -> tuple[int, Array]:
-    """Stamp [ns] and wrench [N, N m] (6,) in world axes; raises InputError as `push`."""
+    """Return stamp [ns] and wrench in world axes, shape (6,) [N, N m]; errors as in `push`."""
     check_frame(message.header.frame_id, WORLD)
     stamp, _, values = push(message, WORLD)
     return stamp, values
 
 
 def to_wrench_stamped(time_ns: int, values: Array, frame: str = WORLD) -> geometry.WrenchStamped:
-    """Message with a wrench [N, N m] (6,) in the axes of a frame."""
+    """Return the message of a wrench in the axes of a frame, shape (6,) [N, N m]."""
     message = geometry.WrenchStamped()
     message.header.stamp, message.header.frame_id = to_stamp(time_ns), frame
     force, torque = message.wrench.force, message.wrench.torque
@@ -115,15 +116,16 @@ def to_wrench_stamped(time_ns: int, values: Array, frame: str = WORLD) -> geomet
 
 
 class SubtaskCodec:
-    """The messages of one subtask, whose values and velocities run over its elements.
+    """Encoder and decoder of the messages of one subtask.
 
-    Whatever a subtask does not have in a message must be finite, and rotations of unit length.
+    Values and velocities are concatenated over its elements. Unused message fields must be finite,
+    and rotations of unit length.
 
     Args:
-        name: The subtask.
-        elements: Names of its elements, as they stand in `joint_names`.
-        axes: Axes of each element, out of x, y, z.
-        rotates: Whether each element has a rotation after them.
+        name: Name of the subtask.
+        elements: Names of its elements, as in `joint_names`.
+        axes: Axes of each element, a subset of x, y, z.
+        rotates: True where each element has a rotation after its axes.
     """
 
     def __init__(
@@ -137,7 +139,7 @@ class SubtaskCodec:
         self._in_twist = places + ([3, 4, 5] if rotates else [])
         pose = np.array([7 * e + place for e in range(count) for place in self._in_pose])
         twist = np.array([6 * e + place for e in range(count) for place in self._in_twist])
-        # Where value, velocity and acceleration are among all numbers of a message.
+        # Indices of value, velocity and acceleration among all numbers of a message.
         self._places = [pose, 7 * count + twist, 13 * count + twist]
         self._marker = CdrTemplate(self._motion(0))
         self._templates = [
@@ -147,24 +149,22 @@ class SubtaskCodec:
         self._wrench = CdrTemplate(to_wrench_stamped(0, np.zeros(6)), self._in_twist)
 
     def encode(self, time_ns: int, *motion: Array) -> bytes:
-        """Serialized MultiDOFJointTrajectory: a reference, the state or the desired motion.
+        """Return a serialized MultiDOFJointTrajectory: reference, state or desired motion.
 
-        Args:
-            time_ns: Stamp [ns].
-            motion: Value (size,), and where known velocity and acceleration (dim,).
+        `motion` is a value (size,), optionally with velocity and acceleration (dim,).
         """
         return self._templates[len(motion) - 1].encode(np.concatenate(motion), time_ns)
 
     def encode_marker(self, time_ns: int) -> bytes:
-        """Serialized MultiDOFJointTrajectory without points: nothing new up to this stamp [ns]."""
+        """Return a serialized MultiDOFJointTrajectory without points; see `Marker`."""
         return self._marker.encode(np.zeros(0), time_ns)
 
     def encode_wrench(self, time_ns: int, force: Array) -> bytes:
-        """Serialized WrenchStamped with a force (dim,); for a subtask with one element."""
+        """Return a serialized WrenchStamped of a force (dim,); for subtasks with one element."""
         return self._wrench.encode(force, time_ns)
 
     def decode(self, data: bytes) -> ParsedReference | Marker:
-        """As `reference`, for serialized bytes."""
+        """Return the reference or marker of serialized bytes; errors as in `reference`."""
         for template in reversed(self._templates):
             found = template.decode(data)
             if found is not None:
@@ -172,13 +172,13 @@ class SubtaskCodec:
         return self.reference(cdr.deserialize(data, MultiDOFJointTrajectory))
 
     def reference(self, message: MultiDOFJointTrajectory) -> ParsedReference | Marker:
-        """What a source asks for in one point, with the elements in any order; or its marker.
+        """Return the reference in the only point, with elements in any order, or the marker.
 
         Raises:
             InputError: The frame is not the world, an element is unknown, missing or given twice,
-                there are several points or a wrong number of entries, accelerations come without
-                velocities, a time from start is given, a number is not finite, a rotation is not
-                of unit length, the stamp is not a time.
+                there are several points, an array has a wrong size, accelerations are given
+                without velocities, `time_from_start` is not zero, a number is not finite, a
+                rotation is not of unit length, or the stamp is not a time.
         """
         stamp = stamp_ns(message.header.stamp)
         check_frame(message.header.frame_id, WORLD)
@@ -197,20 +197,20 @@ class SubtaskCodec:
         return self._parsed(stamp, flat(*parts))
 
     def target(self, message: geometry.PoseStamped) -> tuple[int, Array]:
-        """Stamp [ns] and value (size,) of a set-point; raises InputError as `reference`."""
+        """Return stamp [ns] and value (size,) of a set-point; errors as in `reference`."""
         values = flat(message.pose.position, message.pose.orientation)
         self._check_single(message, values, POSE)
         check_rotations(values[None, 3:], self.elements)
         return stamp_ns(message.header.stamp), self.layout.checked(values[self._in_pose])
 
     def rate(self, message: geometry.TwistStamped) -> tuple[int, Array]:
-        """Stamp [ns] and velocity (dim,) of a rate; raises InputError as `reference`."""
+        """Return stamp [ns] and velocity (dim,) of a rate; errors as in `reference`."""
         values = flat(message.twist.linear, message.twist.angular)
         self._check_single(message, values, TWIST)
         return stamp_ns(message.header.stamp), values[self._in_twist]
 
     def force(self, message: geometry.WrenchStamped) -> tuple[int, Array]:
-        """Stamp [ns] and force (dim,) of a source; raises InputError as `reference`."""
+        """Return stamp [ns] and force (dim,) of a source; errors as in `reference`."""
         values = flat(message.wrench.force, message.wrench.torque)
         self._check_single(message, values, WRENCH)
         return stamp_ns(message.header.stamp), values[self._in_twist]
@@ -263,7 +263,7 @@ class SubtaskCodec:
 
 
 class EnergyCodec:
-    """The energies of a subtask: std_msgs/Float64MultiArray whose entries have names."""
+    """Encoder of std_msgs/Float64MultiArray with one labelled dimension per value."""
 
     def __init__(self, labels: Sequence[str]) -> None:
         message = Float64MultiArray(data=[0.0] * len(labels))
@@ -271,12 +271,12 @@ class EnergyCodec:
         self._template = CdrTemplate(message)
 
     def encode(self, values: Array) -> bytes:
-        """Serialized message with one value per label."""
+        """Return the serialized message with one value per label."""
         return self._template.encode(values)
 
 
 class Level(IntEnum):
-    """Levels of a diagnostic status."""
+    """Levels of diagnostic_msgs/DiagnosticStatus."""
 
     OK = 0
     WARN = 1
@@ -287,14 +287,14 @@ class Level(IntEnum):
 def to_status(
     name: str, level: Level, text: str, values: Mapping[str, object]
 ) -> DiagnosticStatus:
-    """Diagnostic status with values in words, floats with six digits."""
-    words = {k: f"{v:.6g}" if isinstance(v, float) else str(v) for k, v in values.items()}
-    pairs = [KeyValue(key=key, value=word) for key, word in words.items()]
+    """Return a diagnostic status with values as strings, floats with six digits."""
+    strings = {k: f"{v:.6g}" if isinstance(v, float) else str(v) for k, v in values.items()}
+    pairs = [KeyValue(key=key, value=value) for key, value in strings.items()]
     return DiagnosticStatus(level=bytes([level]), name=name, message=text, values=pairs)
 
 
 def to_diagnostics(time_ns: int, statuses: Iterable[DiagnosticStatus]) -> DiagnosticArray:
-    """Message for `/diagnostics` at a time [ns]."""
+    """Return the message for `/diagnostics` at a time [ns]."""
     message = DiagnosticArray(status=list(statuses))
     message.header.stamp = to_stamp(time_ns)
     return message

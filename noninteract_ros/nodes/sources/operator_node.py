@@ -131,7 +131,7 @@ class OperatorNode(ScenarioNode):
         """Return the state of the device, and a warning without a desired motion."""
         held = self.dead_man.is_held(time.monotonic())
         values: dict[str, object] = {
-            "leads": self.settings.subtask,
+            "subtask": self.settings.subtask,
             "messages sent": self._sent,
             "held": held,
         }
