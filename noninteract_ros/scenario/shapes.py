@@ -12,20 +12,19 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import QhullError
 
-from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario.scenario import Scenario
 from noninteract_ros.simulation.environment import Door, RigidObject
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.team.geometry import hulls
 from noninteract_ros.team.geometry.hulls import Hull
+from noninteract_ros.team.geometry.links import sticks, urdf_shapes
+from noninteract_ros.team.geometry.obstacles import Obstacle
 from noninteract_ros.team.models.point_mass import PointMass
-from noninteract_ros.team.models.urdf_files import read_urdf, share_folders
 from noninteract_ros.team.models.urdf_robot import UrdfRobot
 from noninteract_ros.team.robot import Robot
 
 NO_ROBOT = -1
-STICK = 0.07  # radius of a link without geometry, as a share of the longest link
 PANEL = (0.02, 0.05)  # thickness and height of a door, as shares of its width
 FEW = 6  # balls that are drawn as round as can be
 FINE = 0.08  # longest edge of a triangle, as a share of the radius of all that is seen
@@ -64,7 +63,7 @@ def shapes_of(
         parts = _ball(block, scenario, radius) if isinstance(block, PointMass) else []
         if isinstance(block, UrdfRobot):
             parts = list(_collision_geometry(block, robot))
-        for joint, hull in parts or _sticks(robot):
+        for joint, hull in parts or sticks(robot):
             found.append(Shape(*_in_plant(plant, robot, joint, hull), number))
     found += [
         Shape(joint, hull, NO_ROBOT)
@@ -93,46 +92,24 @@ def _ball(block: PointMass, scenario: Scenario, radius: float) -> list[tuple[int
 def _collision_geometry(block: UrdfRobot, robot: Robot) -> Iterator[tuple[int, Hull]]:
     """Collision geometry on the joints of a robot's own model; none if meshes are missing."""
     try:
-        text = read_urdf("urdf", block.urdf) if block.urdf else block.urdf_text
-        full = pin.buildModelFromXML(text)
-        folders = [str(folder) for folder in share_folders()]
-        geometry = pin.buildGeomFromUrdfString(full, text, pin.COLLISION, package_dirs=folders)
+        shapes = list(urdf_shapes(block.description(robot.name), robot))
     except (ScenarioError, ValueError):
         return
-    for item in geometry.geometryObjects:
-        link = full.frames[item.parentFrame]
-        frame = robot.model.frames[robot.model.getFrameId(link.name, pin.FrameType.BODY)]
+    for shape in shapes:
         try:
-            hull = hulls.geometry_hull(item.geometry)
+            hull = hulls.geometry_hull(shape.geometry)
         except QhullError:  # A flat mesh.
             continue
         if hull is not None:
-            place = frame.placement * link.placement.inverse() * item.placement
-            yield frame.parentJoint, hull.transformed(place)
-
-
-def _sticks(robot: Robot) -> list[tuple[int, Hull]]:
-    """Links as sticks from each joint to those that follow, and to the tool."""
-    model = robot.model
-    tool = model.frames[model.getFrameId(robot.tool_frame)]
-    ends: list[tuple[int, Array]] = [
-        (int(model.parents[joint]), model.jointPlacements[joint].translation)
-        for joint in range(1, model.njoints)
-    ]
-    ends.append((int(tool.parentJoint), tool.placement.translation))
-    longest = max(float(np.linalg.norm(end)) for _, end in ends)
-    radius = STICK * (longest or 1.0)
-    return [(0, hulls.cylinder(2.0 * radius, 2.0 * radius))] + [
-        (parent, hulls.capsule(np.zeros(3), end, radius))
-        for parent, end in ends
-        if np.linalg.norm(end) > 0.01 * longest
-    ]
+            yield shape.joint, hull.transformed(shape.placement)
 
 
 def _body(name: str, block: object, plant: Plant) -> list[tuple[int, Hull]]:
     """A rigid object as a box; a door as a panel from its hinge to beyond its handles."""
     if isinstance(block, RigidObject):
         return [(plant.model.getJointId(f"{name}/pose"), hulls.box(np.array(block.size)))]
+    if isinstance(block, Obstacle):
+        return [(0, block.hull(name))]
     if not isinstance(block, Door):
         return []
     handles = [

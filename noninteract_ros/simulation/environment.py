@@ -11,6 +11,7 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError, one_of
 from noninteract_ros.schema import join, key
 from noninteract_ros.simulation.contact import Coupling, Grip, WallContact
+from noninteract_ros.team.geometry.obstacles import OBSTACLES
 from noninteract_ros.team.team import Team
 
 
@@ -140,6 +141,7 @@ SURROUNDINGS: dict[str, type[SurroundingBlock]] = {
     "rigid_object": RigidObject,
     "door": Door,
     "wall": Wall,
+    **OBSTACLES,
 }
 
 

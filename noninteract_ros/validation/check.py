@@ -13,6 +13,7 @@ from noninteract_ros.reporting.checks.check_report import CheckReport, Section
 from noninteract_ros.reporting.checks.checks import at_least, at_most
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.files import find_scenario, load_scenario
+from noninteract_ros.team.team import Team
 from noninteract_ros.validation.delay.delay import check_delay
 from noninteract_ros.validation.gauntlet.settings import GauntletSettings
 from noninteract_ros.validation.identities.identities import identities
@@ -20,6 +21,7 @@ from noninteract_ros.validation.identities.identity_check import check_identitie
 from noninteract_ros.validation.identities.law_probe import LawProbe
 
 STATES = 20  # random states, unless another number is asked for
+NEAREST = 5  # pairs of bodies that are listed
 SINGULAR = 1e-6  # smallest singular value below which the subtasks count as dependent
 
 
@@ -106,6 +108,7 @@ def check_scenario(name: str, scenario: Scenario, settings: CheckSettings) -> Ch
         _robots(team.names, team.joint_names),
         _subtasks(scenario, stack.subtasks, dynamics.inertias),
         _loops(loops),
+        _clearances(scenario, team),
     )
     warnings = tuple(text for loop in loops if (text := loop.warning()))
     return CheckReport(name, sections, tuple(checks), warnings)
@@ -143,3 +146,23 @@ def _loops(loops: list[Loop]) -> Section:
     )
     columns = ("loop", "damping ratios", "slowest [1/s]", "fastest [1/s]")
     return Section("loops", (*columns, "ticks per time constant", "growth per tick"), rows)
+
+
+def _clearances(scenario: Scenario, team: Team) -> Section:
+    """Return the nearest pairs of bodies at the start, and the pairs that are left out."""
+    from noninteract_ros.scenario.collision import collision_geometry  # Loads the compiler.
+
+    scene = collision_geometry(scenario, team)
+    found = scene.evaluate(team.q0, np.zeros(team.n))
+    nearest = np.argsort(found.distances)[:NEAREST]
+    left_out = [("overlap", scene.pairs.always), ("always apart", scene.pairs.never)]
+    rows = (
+        *((scene.name(found.pairs[k]), f"{found.distances[k]:.4g}") for k in nearest),
+        *(
+            (f"{scene.bodies[i].name} - {scene.bodies[j].name}", why)
+            for why, pairs in left_out
+            for i, j in pairs
+        ),
+    )
+    title = f"bodies: {len(scene.bodies)}, pairs watched: {len(scene.pairs.watched)}"
+    return Section(title, ("pair", "distance at the start [m]"), rows)

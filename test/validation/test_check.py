@@ -226,7 +226,7 @@ def test_natural_is_one_loop_of_all_subtasks(tmp_path: Path) -> None:
 def test_a_builtin_check_goes_before_a_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
     """A target that names a built-in check runs that check."""
     expected = CheckReport("law", (), (), ())
-    monkeypatch.setitem(check.BUILT_IN, "law", lambda settings: expected)
+    monkeypatch.setitem(check.BUILT_IN, "law", lambda settings, others: expected)
     assert run_check("law", FEW) is expected
 
 

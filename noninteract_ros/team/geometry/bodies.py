@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Bodies that can collide: links of robots, held objects, surroundings."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+from scipy.spatial import ConvexHull
+
+from noninteract_ros.arrays import Array
+from noninteract_ros.team.geometry.fitting import Capsule, capsule_around
+from noninteract_ros.team.geometry.hulls import geometry_hull
+from noninteract_ros.team.geometry.links import LinkShape, segments, stick_radius
+from noninteract_ros.team.robot import Robot
+from noninteract_ros.team.team import Team
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body fixed to a joint.
+
+    Attributes:
+        name: Its name, `<owner>/<link>` or that of a surrounding.
+        owner: Robot or surrounding that it belongs to.
+        joint: Joint that carries it in the team's model; 0 is the world.
+        capsule: The body itself or, of a convex one, a capsule around it; for a plane, a point of
+            it and the point one normal above.
+        convex: Geometry of coal in the joint's frame; None for a capsule and for a plane.
+        plane: True for a half-space, which belongs to the world.
+        touches: Joints whose bodies it touches by design, such as those of grippers.
+    """
+
+    name: str
+    owner: str
+    joint: int
+    capsule: Capsule
+    convex: Any = None
+    plane: bool = False
+    touches: frozenset[int] = frozenset()
+
+
+def convex_body(points: Array) -> Any:
+    """Convex geometry of coal around points, shape (m, 3) [m]."""
+    corners = coal.StdVec_Vec3s()
+    for point in points:
+        corners.append(point)
+    return coal.Convex.convexHull(corners, True, "Qt")
+
+
+def link_bodies(
+    robot: Robot, shapes: Sequence[LinkShape], team: Team, exact: bool = False
+) -> list[Body]:
+    """Bodies of a robot's links, one per link.
+
+    Args:
+        robot: The robot.
+        shapes: Collision geometry of its links; without any, links are sticks.
+        team: The team, whose joints carry the bodies.
+        exact: True for convex hulls, False for capsules around them.
+    """
+    found: dict[tuple[str, int], list[Array]] = {}
+    for shape in shapes:
+        hull = geometry_hull(shape.geometry)
+        if hull is not None:
+            points = hull.points @ shape.placement.rotation.T + shape.placement.translation
+            found.setdefault((shape.link, shape.joint), []).append(points)
+    bodies = []
+    for (link, joint), parts in found.items():
+        points = np.concatenate(parts)
+        points = points[ConvexHull(points).vertices]
+        convex = convex_body(points) if exact else None
+        bodies.append(_placed(robot, team, link, joint, capsule_around(points), convex))
+    return bodies or _stick_bodies(robot, team)
+
+
+def _stick_bodies(robot: Robot, team: Team) -> list[Body]:
+    ends = segments(robot)
+    moving = [item for item in ends if item[0] > 0]
+    if not any(end.any() for _, end in moving):  # A point mass.
+        tool = Capsule(np.zeros(3), np.zeros(3), 0.0)
+        return [_placed(robot, team, robot.tool_frame, ends[-1][0], tool, None)]
+    radius = stick_radius(ends)
+    return [
+        _placed(robot, team, f"link_{joint}", joint, Capsule(np.zeros(3), end, radius), None)
+        for joint, end in moving
+        if end.any()
+    ]
+
+
+def _placed(
+    robot: Robot, team: Team, link: str, joint: int, capsule: Capsule, convex: Any
+) -> Body:
+    """A body on a joint of the robot's own model, as one on a joint of the team's."""
+    body = Body(f"{robot.name}/{link}", robot.name, joint, capsule, convex)
+    if joint == 0:
+        return moved(body, robot.base_pose, 0)
+    number = team.model.getJointId(f"{robot.name}/{robot.model.names[joint]}")
+    return replace(body, joint=number)
+
+
+def moved(body: Body, pose: pin.SE3, joint: int) -> Body:
+    """The same body on another joint, in whose frame the body's old frame has a pose."""
+    capsule = Capsule(
+        pose.act(body.capsule.start), pose.act(body.capsule.end), body.capsule.radius
+    )
+    convex = body.convex
+    if convex is not None:
+        convex = convex_body(convex.points() @ pose.rotation.T + pose.translation)
+    return replace(body, joint=joint, capsule=capsule, convex=convex)
