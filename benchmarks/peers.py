@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a cycle of placo costs for the teams of Pandas whose law `noninteract bench` times.
+"""Benchmark of a placo cycle for the teams of Pandas that `noninteract bench` measures.
 
-In an environment of its own: `pip install placo example-robot-data`, then `python peers.py`.
+Run in a separate environment: `pip install placo example-robot-data`, then `python peers.py`.
 The tasks are a position and an orientation for each hand and a position for each arm's elbow
-joint, without limits: as many coordinates as the law has, though neither a mean nor pairs.
+joint, without limits: as many coordinates as the law has, but neither means nor pairs.
 """
 
 import copy
@@ -23,7 +23,7 @@ PANDA = "share/example-robot-data/robots/panda_description/urdf/panda.urdf"
 
 
 def panda() -> ElementTree.Element:
-    """The model, with locked fingers, and without what is only seen."""
+    """Return the model with fixed fingers and without geometry."""
     places = [Path(entry, "cmeel.prefix", PANDA) for entry in sys.path]
     root = ElementTree.parse(next(place for place in places if place.is_file())).getroot()
     for link in root.findall("link"):
@@ -38,7 +38,7 @@ def panda() -> ElementTree.Element:
 
 
 def team(count: int) -> str:
-    """URDF of several Pandas on one floor, each name with the number of its arm before it."""
+    """Return the URDF of several Pandas on one floor, with names prefixed by the arm's number."""
     arm = panda()
     base = arm.find("link").get("name")
     result = ElementTree.Element("robot", name="team")
@@ -59,7 +59,7 @@ def team(count: int) -> str:
 
 
 def cycle_times(count: int) -> np.ndarray:
-    """Times of `update_kinematics` and `solve` [us]."""
+    """Return the times of `update_kinematics` and `solve` [us]."""
     robot = placo.RobotWrapper("", placo.Flags.ignore_collisions, team(count))
     for i in range(count):
         for joint, angle in enumerate(START, start=1):
@@ -77,10 +77,10 @@ def cycle_times(count: int) -> np.ndarray:
         elbow.configure(f"{i}_elbow", "soft", 1.0)
     times = []
     for number in range(CYCLES + WARM_UP):
-        began = time.perf_counter_ns()
+        start = time.perf_counter_ns()
         robot.update_kinematics()
         result = solver.solve()
-        times.append(1e-3 * (time.perf_counter_ns() - began))
+        times.append(1e-3 * (time.perf_counter_ns() - start))
         if not result.success:
             raise RuntimeError(f"no solution in cycle {number}")
     return np.array(times[WARM_UP:])

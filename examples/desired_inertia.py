@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Remark 2: what another M_i changes (force inputs, gains) and what it cannot (a push)."""
+"""Remark 2: effect of the desired inertia M_i on force inputs and gains, but not on a push."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def main() -> None:
     settings = [spec.impedance for spec in scenario.subtasks.values()]
     state = team.state(team.q0, np.zeros(team.n))
     task = stack.evaluate(state)
-    print("First acceleration and resting place of the cooperative subtask along x")
+    print("Initial acceleration and final displacement of the cooperative subtask along x")
     print("  M_c [kg]   6 N force input          6 N push on robot_1")
     for inertia in ((), (1.0,), (12.0,)):
         changed = [replace(settings[0], inertia=inertia), settings[1]]
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def push_acceleration(dynamics: TaskDynamics) -> float:
-    """J M^-1 tau_e: no choice of Gamma stands in it."""
+    """Return J M^-1 tau_e [m/s^2] along x, which does not depend on Gamma."""
     return float((dynamics.J @ np.linalg.solve(dynamics.M, PUSH))[0])
 
 

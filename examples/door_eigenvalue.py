@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Passive where it is touched? A passive door makes `noninteracting` unstable, `natural` not."""
+"""Interaction with a passive door: unstable under `noninteracting`, stable under `natural`."""
 
 import numpy as np
 
@@ -18,6 +18,7 @@ DOOR_STIFFNESS = 50e3  # N/m
 
 
 def two_robots_at_rest() -> TaskDynamics:
+    """Return the task dynamics of two point masses at rest."""
     robots = [PointMass(mass=m, axes=("x",)).build(f"robot_{i}") for i, m in enumerate(MASSES)]
     team = Team(robots)
     kinds = CooperativePosition("cooperative_position"), RelativePosition("relative_position")
@@ -28,8 +29,11 @@ def two_robots_at_rest() -> TaskDynamics:
     return task_dynamics(state, stack.evaluate(state), stack.slices, (None, None))
 
 
-def fastest_growth(inertia: np.ndarray, damping: np.ndarray, spring: np.ndarray) -> float:
-    """Largest real part of the eigenvalues of inertia x'' + damping x' + spring x = 0 [1/s]."""
+def largest_real_part(inertia: np.ndarray, damping: np.ndarray, spring: np.ndarray) -> float:
+    """Return the largest real part of the eigenvalues [1/s].
+
+    The system is inertia x'' + damping x' + spring x = 0.
+    """
     zero, one = np.zeros((2, 2)), np.eye(2)
     accelerations = np.linalg.solve(inertia, np.hstack([-spring, -damping]))
     return float(np.linalg.eigvals(np.vstack([np.hstack([zero, one]), accelerations])).real.max())
@@ -41,7 +45,7 @@ def main() -> None:
     damping = 2.0 * np.diag(DAMPING_RATIOS) * np.sqrt(STIFFNESS * decoupled)
     b = np.array([np.cos(DOOR_ANGLE), np.sin(DOOR_ANGLE)])
     door = dynamics.S.T @ np.outer(b, DOOR_STIFFNESS * b) @ dynamics.S  # S' tau_e = -door x
-    # tau~_e = M_s Lambda^-1 S' tau_e: the noninteracting law reshapes what the door does.
+    # tau~_e = M_s Lambda^-1 S' tau_e: the noninteracting law reshapes the door's torque.
     reshaped = decoupled @ np.linalg.solve(dynamics.inertia, door)
     loops = {
         "noninteracting, free": (decoupled, STIFFNESS),
@@ -50,7 +54,7 @@ def main() -> None:
     }
     print("Largest real part of the closed loop's eigenvalues (positive: unstable)")
     for name, (inertia, spring) in loops.items():
-        print(f"  {name:28} {fastest_growth(inertia, damping, spring):+8.3f} 1/s")
+        print(f"  {name:28} {largest_real_part(inertia, damping, spring):+8.3f} 1/s")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torque held over a tick: what crosses over on arms shrinks with the tick, in order 1."""
+"""Zero-order hold of the torque: coupling between subtasks of arms is of order 1 in the tick."""
 
 import numpy as np
 
@@ -11,18 +11,18 @@ DURATION = 2.0  # s
 RATES = (250.0, 500.0, 1000.0)  # Hz
 
 
-def moved(rate: float) -> tuple[float, float]:
-    """How far the human moves the team and, unasked, the grasp of two arms [m]."""
+def displacements(rate: float) -> tuple[float, float]:
+    """Return the displacement of the team and of the grasp due to the human input [m]."""
     scenario = Scenario.from_dict(read_parameters(find_scenario("planar_arms")) | {"rate": rate})
-    led, alone = (rehearse(scenario, DURATION, human=human).x for human in (True, False))
-    distance = np.abs(led - alone).max(axis=0)
+    with_human, without = (rehearse(scenario, DURATION, human=human).x for human in (True, False))
+    distance = np.abs(with_human - without).max(axis=0)
     return distance[:2].max(), distance[2:].max()
 
 
 def main() -> None:
     print("  rate [Hz]   cooperative [m]   relative [m]")
     for rate in RATES:
-        cooperative, relative = moved(rate)
+        cooperative, relative = displacements(rate)
         print(f"{rate:11.0f} {cooperative:17.3f} {relative:14.2e}")
 
 

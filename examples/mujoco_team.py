@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A plant of one's own in the place of robot_team: MuJoCo's dynamics of a scenario's URDF robots.
+"""Plant node that replaces robot_team: MuJoCo dynamics of a scenario's URDF robots.
 
-MuJoCo reads the URDF by itself; nothing touches anything. `_on_command` is all of lockstep.
+MuJoCo loads the URDF itself; there are no contacts. `_on_command` implements lockstep.
 With the extra `peer`: python examples/mujoco_team.py config/dual_panda_free.yaml
 """
 
@@ -21,13 +21,13 @@ from sensor_msgs.msg import JointState
 from noninteract_ros.scenario.files import find_scenario, read_parameters
 from noninteract_ros.team.models.urdf_files import read_urdf
 
-SUBSTEPS = 2  # of MuJoCo in a tick
-RESEND = 0.2  # [s] after which a state that nobody has answered is sent again
-DEPTH = 1000  # of the queues
+SUBSTEPS = 2  # MuJoCo steps per tick
+RESEND_PERIOD = 0.2  # [s] after which a state without a command is published again
+QUEUE_DEPTH = 1000
 
 
 def team_model(values: Mapping[str, Any]) -> mujoco.MjModel:
-    """All robots of a scenario on their bases; joints are named `<robot>/<joint>`."""
+    """Return a model of all robots on their bases, with joints named `<robot>/<joint>`."""
     team = mujoco.MjSpec()
     team.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     team.option.timestep = 1.0 / values["rate"] / SUBSTEPS
@@ -39,13 +39,13 @@ def team_model(values: Mapping[str, Any]) -> mujoco.MjModel:
 
 
 def robot_spec(block: Mapping[str, Any]) -> mujoco.MjSpec:
-    """One robot from its block in the scenario, whose friction and armature are one number."""
+    """Return one robot from its block, whose friction and armature are the same for all joints."""
     spec = mujoco.MjSpec.from_string(read_urdf("urdf", block["urdf"]))
     for item in (*spec.geoms, *spec.meshes):
         spec.delete(item)
     locked = dict(zip(block["locked_joints"], block["locked_positions"], strict=True))
     for joint in spec.joints:
-        if joint.name in locked:  # A body without its joint would stay at zero.
+        if joint.name in locked:  # Without its joint, the body would stay at position zero.
             body, axis = joint.parent, np.zeros(3)
             mujoco.mju_rotVecQuat(axis, joint.axis, body.quat)
             body.pos = body.pos + locked[joint.name] * axis
@@ -58,7 +58,7 @@ def robot_spec(block: Mapping[str, Any]) -> mujoco.MjSpec:
 
 
 class MujocoTeam(Node):
-    """Steps when the command that answers its state has come, until `end_time`."""
+    """Plant in lockstep: step on the command with the stamp of the state, until `end_time`."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         super().__init__("robot_team", namespace="team")
@@ -69,14 +69,13 @@ class MujocoTeam(Node):
         self.rate, self.end_time = values["rate"], values.get("end_time", np.inf)
         self.tick = 0
         self.finished = rclpy.task.Future()
-        self.publisher = self.create_publisher(JointState, "joint_states", DEPTH)
-        self.wrenches = [  # Whoever waits for force sensors hears that nothing touches them.
-            self.create_publisher(WrenchStamped, f"{robot}/external_wrench", DEPTH)
+        self.state_publisher = self.create_publisher(JointState, "joint_states", QUEUE_DEPTH)
+        self.wrench_publishers = [  # Zero wrenches, which the controller waits for.
+            self.create_publisher(WrenchStamped, f"{robot}/external_wrench", QUEUE_DEPTH)
             for robot in values.get("force_sensors", [])
         ]
-        self.create_subscription(JointState, "joint_commands", self._on_command, DEPTH)
-        self.resend = self.create_timer(RESEND, self._publish)
-
+        self.create_subscription(JointState, "joint_commands", self._on_command, QUEUE_DEPTH)
+        self.resend_timer = self.create_timer(RESEND_PERIOD, self._publish)
         self._publish()
 
     def _publish(self) -> None:
@@ -87,14 +86,14 @@ class MujocoTeam(Node):
         state.effort = self.data.qfrc_applied.tolist()
         wrench = WrenchStamped(header=state.header)
         wrench.header.frame_id = "world"
-        for publisher in self.wrenches:
+        for publisher in self.wrench_publishers:
             publisher.publish(wrench)
-        self.publisher.publish(state)
-        self.resend.reset()
+        self.state_publisher.publish(state)
+        self.resend_timer.reset()
 
     def _on_command(self, command: JointState) -> None:
         if command.header.stamp != self.stamp:
-            return  # A second answer to a state that was sent twice.
+            return  # Duplicate command for a state that was published twice.
         if self.tick >= self.end_time * self.rate:
             self.finished.set_result(None)
             return
@@ -110,7 +109,7 @@ def main() -> None:
     rclpy.init()
     node = MujocoTeam(read_parameters(path))
     rclpy.spin_until_future_complete(node, node.finished)
-    print(f"MuJoCo moved {node.model.nv} joints for {node.tick / node.rate:g} s.")
+    print(f"MuJoCo simulated {node.model.nv} joints for {node.tick / node.rate:g} s.")
 
 
 if __name__ == "__main__":

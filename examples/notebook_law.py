@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The law without ROS: the human moves two unlike robots, their formation does not notice."""
+"""The law without ROS: a human input moves two robots of different mass in formation."""
 
 import numpy as np
 

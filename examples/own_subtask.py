@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A kind of subtask of one's own: distance and bearing of two robots, led each by itself."""
+"""Custom kind of subtask: distance and bearing of two robots, with independent references."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from noninteract_ros.team.team import Team, TeamState
 
 
 class PolarFormation(Subtask):
-    """x = (distance [m], bearing [rad]) of the first robot from the second, in the x-y plane."""
+    """Distance [m] and bearing [rad] of the first robot from the second, in the x-y plane."""
 
     elements = ("distance", "bearing")
     axes = ("x",)  # One number per element, sent as the x of a message.
@@ -24,28 +24,31 @@ class PolarFormation(Subtask):
         self.name = name
 
     def evaluate(self, state: TeamState) -> SubtaskState:
-        """Value, Jacobian and its exact rate; not defined where the robots meet."""
+        """Return value, Jacobian and its exact rate; undefined at zero distance."""
         d = (state.tool_positions[0] - state.tool_positions[1])[:2]
         D = (state.tool_jacobians[0] - state.tool_jacobians[1])[:2]
         D_rate = (state.tool_jacobian_rates[0] - state.tool_jacobian_rates[1])[:2]
         r = np.hypot(*d)
         along = d / r
         across = np.array([-along[1], along[0]])
-        r_rate, turn_rate = along @ D @ state.v, across @ D @ state.v / r
+        r_rate, bearing_rate = along @ D @ state.v, across @ D @ state.v / r
         J = np.array([along @ D, across @ D / r])
-        across_rate = -(turn_rate * along + r_rate / r * across) / r  # of across / r
-        J_rate = [turn_rate * across @ D + along @ D_rate, across_rate @ D + across @ D_rate / r]
+        across_rate = -(bearing_rate * along + r_rate / r * across) / r  # of across / r
+        J_rate = [
+            bearing_rate * across @ D + along @ D_rate,
+            across_rate @ D + across @ D_rate / r,
+        ]
         return SubtaskState(np.array([r, np.arctan2(d[1], d[0])]), J, np.array(J_rate))
 
 
 @dataclass(frozen=True)
 class PolarFormationBlock:
-    """Its configuration block."""
+    """Configuration block of the kind."""
 
     kind: str = key("Kind of subtask", choices=("polar_formation",))
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask]) -> Subtask:
-        """The subtask for a team; the stack checks that it fits."""
+        """Build the subtask for a team; the stack validates it."""
         return PolarFormation(name)
 
 
@@ -74,9 +77,9 @@ def main() -> None:
         simulation.step(tick.torque)
         rows.append(tick.task.x)
     x = np.array(rows)
-    print(f"Centre went from {x[0, :2].round(3)} to {x[-1, :2].round(3)} m,")
+    print(f"Centre moved from {x[0, :2].round(3)} to {x[-1, :2].round(3)} m,")
     print(f"bearing from {np.rad2deg(x[0, 3]):.1f} to {np.rad2deg(x[-1, 3]):.1f} degrees;")
-    print(f"the distance left 1 m by at most {np.abs(x[:, 2] - 1.0).max():.1e} m.")
+    print(f"the distance deviated from 1 m by at most {np.abs(x[:, 2] - 1.0).max():.1e} m.")
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots that tell their states at different times: what carrying the older ones on costs."""
+"""Robot states of different ages: error of the law with predicted states."""
 
 from collections import deque
 
@@ -11,35 +11,35 @@ from noninteract_ros.scenario.rehearsal import Rehearsal
 from noninteract_ros.team.state_assembler import PREDICTIONS, StateAssembler
 
 DURATION = 2.5  # s
-AGES = (0, 1, 2, 3)  # ms by which the states of the second robot are older
+AGES = (0, 1, 2, 3)  # ms, age of the second robot's states relative to the first
 
 
-def late_eyes(rehearsal: Rehearsal, prediction: str, age: int) -> None:
-    """Has the controller see the second robot as it was so many ticks ago, carried on to now."""
+def delay_second_robot(rehearsal: Rehearsal, prediction: str, age: int) -> None:
+    """Delay the second robot's states by `age` ticks, and predict them to the current time."""
     team, step = rehearsal.team, rehearsal.controller.step
     assembler = StateAssembler(team.joint_names, prediction, max_skew=0.02)
     first, second = (np.arange(part.start, part.stop) for part in team.velocity_slices)
-    told = deque(maxlen=age + 1)
+    states = deque(maxlen=age + 1)
 
-    def seen(now, q, v, **more):
-        told.append((round(1e9 * now), q, v))
-        for joints, (stamp, position, velocity) in ((first, told[-1]), (second, told[0])):
+    def delayed_step(now, q, v, **more):
+        states.append((round(1e9 * now), q, v))
+        for joints, (stamp, position, velocity) in ((first, states[-1]), (second, states[0])):
             assembler.update(joints, stamp, position[joints], velocity[joints])
         state = assembler.assemble()
         return step(now, state.position, state.velocity, **more)
 
-    rehearsal.controller.step = seen
+    rehearsal.controller.step = delayed_step
 
 
 def error(prediction: str, age: int) -> float:
-    """How far the grasp of two arms, led at 0.5 m/s, is from where autonomy wants it [m]."""
+    """Return the largest error of the grasp of two arms in motion at 0.5 m/s [m]."""
     rehearsal = Rehearsal(Scenario.from_dict(read_parameters(find_scenario("planar_arms"))))
-    late_eyes(rehearsal, prediction, age)
+    delay_second_robot(rehearsal, prediction, age)
     largest = 0.0
     for _ in range(round(DURATION * 1000)):
-        wanted = rehearsal.step().led[1].reference.position
+        desired = rehearsal.step().led[1].reference.position
         state = rehearsal.team.state(rehearsal.simulation.q, rehearsal.simulation.v)
-        largest = max(largest, np.abs(rehearsal.stack.evaluate(state).x[2:] - wanted).max())
+        largest = max(largest, np.abs(rehearsal.stack.evaluate(state).x[2:] - desired).max())
     return largest
 
 

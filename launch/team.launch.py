@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Starts the programs of one scenario.
+"""Start the programs of one scenario.
 
 `ros2 launch noninteract_ros team.launch.py scenario:=paper namespace:=team record:=false`
 """
@@ -17,7 +17,7 @@ PACKAGE = "noninteract_ros"
 
 
 def generate_launch_description() -> LaunchDescription:
-    """The launch arguments and, once they are known, the nodes."""
+    """Return the launch arguments, and the nodes that depend on them."""
     return LaunchDescription(
         [
             DeclareLaunchArgument(
@@ -29,7 +29,7 @@ def generate_launch_description() -> LaunchDescription:
                 "namespace", default_value="team", description="Namespace of all nodes"
             ),
             DeclareLaunchArgument(
-                "record", default_value="true", description="Whether the recorder runs too"
+                "record", default_value="true", description="Start the recorder"
             ),
             OpaqueFunction(function=start_nodes),
         ]
@@ -37,7 +37,7 @@ def generate_launch_description() -> LaunchDescription:
 
 
 def start_nodes(context: LaunchContext) -> list[Node]:
-    """One process per program, all with the scenario's parameter file."""
+    """Return one node per program, all with the scenario's parameter file."""
     common = {
         "package": PACKAGE,
         "namespace": LaunchConfiguration("namespace"),
@@ -46,7 +46,7 @@ def start_nodes(context: LaunchContext) -> list[Node]:
     }
     others = ("haptic_emulator", "relative_planner", "controller")
     return [
-        # Without its robots a run is over, and so is one whose scenario is refused.
+        # The run ends with its robots, or if robot_team rejects the scenario.
         Node(executable="robot_team", on_exit=Shutdown(reason="robot_team ended"), **common),
         *(Node(executable=name, **common) for name in others),
         Node(
@@ -56,13 +56,12 @@ def start_nodes(context: LaunchContext) -> list[Node]:
 
 
 def scenario_file(scenario: str) -> Path:
-    """The parameter file that a path or a name stands for.
+    """Return the parameter file of a path or of an installed name.
 
-    It is looked up without the package's own code: the Python that runs `ros2 launch` need not be
-    the one that the package is installed for.
+    Uses no code of the package, because `ros2 launch` may run in another Python.
 
     Raises:
-        FileNotFoundError: There is none; the text lists the installed names.
+        FileNotFoundError: The file does not exist; the text lists the installed names.
     """
     installed = Path(get_package_share_directory(PACKAGE)) / "config"
     for candidate in (Path(scenario), installed / f"{scenario}.yaml"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The examples and the README's Python run as they stand, without ROS."""
+"""Examples and Python code of the README, run without ROS."""
 
 import os
 import re
@@ -28,7 +28,7 @@ runpy.run_path(sys.argv[1], run_name="__main__")
 
 @cache
 def run(script: Path) -> str:
-    """Runs a script in an empty folder with rclpy out of reach; returns what it printed."""
+    """Run a script in an empty folder without rclpy; return its output."""
     with TemporaryDirectory() as folder:
         done = subprocess.run(
             [sys.executable, "-c", WITHOUT_ROS, str(script)],
@@ -44,18 +44,18 @@ def run(script: Path) -> str:
 
 
 def numbers(text: str) -> list[float]:
-    """All numbers in a text, in order."""
+    """Return all numbers in a text, in order."""
     return [float(found) for found in re.findall(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?", text)]
 
 
 @pytest.mark.parametrize("script", EXAMPLES, ids=lambda script: script.stem)
 def test_example_runs_without_ros(script: Path) -> None:
-    """Every example ends well and prints something."""
+    """Every example succeeds and prints a result."""
     assert run(script).strip()
 
 
 def test_readme_shows_the_law_in_under_20_lines(tmp_path: Path) -> None:
-    """The README's Python is short, is that of the example, and leads the team to its goal."""
+    """The README's code is short, is part of the example, and reaches its goal."""
     assert len(README_CODE) == 1
     assert len(README_CODE[0].splitlines()) < 20
     assert README_CODE[0] in (ROOT / "examples" / "notebook_law.py").read_text(encoding="utf-8")
@@ -64,8 +64,8 @@ def test_readme_shows_the_law_in_under_20_lines(tmp_path: Path) -> None:
     assert numbers(run(script))[:4] == [1.0, 0.5, 1.0, 0.0]
 
 
-def test_the_door_is_what_the_documents_warn_of() -> None:
-    """`noninteracting` is unstable at the passive door, `natural` is not; both are alone."""
+def test_a_passive_door_destabilizes_only_the_noninteracting_law() -> None:
+    """`noninteracting` is unstable at the door and stable without; `natural` is stable."""
     lines = run(ROOT / "examples" / "door_eigenvalue.py").splitlines()[1:]
     free, decoupled, natural = (numbers(line)[0] for line in lines)
     assert free < 0.0
@@ -74,15 +74,15 @@ def test_the_door_is_what_the_documents_warn_of() -> None:
 
 
 def test_the_human_moves_the_formation_only_under_the_natural_law() -> None:
-    """What crosses over is centimetres under `natural` and rounding under `noninteracting`."""
+    """The coupling is centimetres under `natural` and rounding under `noninteracting`."""
     lines = run(ROOT / "examples" / "noninteraction.py").splitlines()[-2:]
     natural, noninteracting = (numbers(line)[0] for line in lines)
     assert natural > 0.01
     assert noninteracting < 1e-12
 
 
-def test_the_paper_without_ros_meets_its_closed_form_in_order_1() -> None:
-    """Below 2 mm at 1 kHz, halved when the rate doubles, with storages that are not negative."""
+def test_the_paper_converges_to_its_closed_form_in_order_1() -> None:
+    """The error is below 2 mm at 1 kHz and halves at twice the rate; storages are not negative."""
     printed = run(ROOT / "examples" / "paper_without_ros.py")
     rows = [numbers(line) for line in printed.splitlines()[1:4]]
     for slow, fast in pairwise(rows):
@@ -93,8 +93,8 @@ def test_the_paper_without_ros_meets_its_closed_form_in_order_1() -> None:
     assert min(row[3] for row in rows) >= 0.0
 
 
-def test_what_states_of_different_times_cost() -> None:
-    """In proportion to the age with constant velocity; measured acceleration costs far less."""
+def test_the_error_of_predicted_states() -> None:
+    """It is proportional to the age at constant velocity, and far less with accelerations."""
     printed = run(ROOT / "examples" / "states_at_different_times.py").splitlines()[1:]
     same, *aged = (numbers(line) for line in printed)
     assert same[1] == same[2] < 1e-6
@@ -103,8 +103,8 @@ def test_what_states_of_different_times_cost() -> None:
         assert accelerated < 0.02 * constant
 
 
-def test_what_crosses_over_on_arms_falls_with_the_tick() -> None:
-    """Holding the torque over a tick lets micrometres through, half as many at twice the rate."""
+def test_the_coupling_on_arms_is_of_order_1_in_the_tick() -> None:
+    """A zero-order hold couples the subtasks by micrometres, half as much at twice the rate."""
     rows = [
         numbers(line) for line in run(ROOT / "examples" / "holding_the_torque.py").splitlines()[1:]
     ]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Both ways to install the package, each into a place of its own: pip and colcon."""
+"""Installation of the package with pip and with colcon, into separate prefixes."""
 
 import os
 import shutil
@@ -13,10 +13,10 @@ import pytest
 from repository import PACKAGE, ROOT, programs
 
 DEADLINE = 240.0  # s, for a command that installs
-START_DEADLINE = 60.0  # s, for a program that is to refuse its parameter file
+START_DEADLINE = 60.0  # s, for a program that rejects its parameter file
 
-PRINT_WHERE_IMPORTED = f"import {PACKAGE}; print({PACKAGE}.__file__)"
-FIND_AS_ROS2_RUN = f"""
+PRINT_PACKAGE_PATH = f"import {PACKAGE}; print({PACKAGE}.__file__)"
+PRINT_AMENT_PREFIX = f"""
 from ament_index_python.packages import get_package_prefix, get_package_share_directory
 print(get_package_prefix("{PACKAGE}"))
 print(get_package_share_directory("{PACKAGE}"))
@@ -24,13 +24,15 @@ print(get_package_share_directory("{PACKAGE}"))
 
 
 def environment(**changes: str) -> dict[str, str]:
-    """This process's environment without another Python path or ROS prefix in it."""
-    kept = {k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "AMENT_PREFIX_PATH")}
-    return kept | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"} | changes
+    """Return the environment without a Python path and ROS prefix."""
+    inherited = {
+        k: v for k, v in os.environ.items() if k not in ("PYTHONPATH", "AMENT_PREFIX_PATH")
+    }
+    return inherited | {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"} | changes
 
 
 def run(*command: str | Path, **options: object) -> str:
-    """Runs a command that must succeed and returns what it printed."""
+    """Run a command that must succeed; return its output."""
     options = {"env": environment(), "timeout": DEADLINE} | options
     done = subprocess.run(
         [str(part) for part in command], capture_output=True, text=True, check=False, **options
@@ -41,7 +43,7 @@ def run(*command: str | Path, **options: object) -> str:
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of what git knows of the repository, so that builds leave nothing behind in it."""
+    """Return a copy of the tracked and untracked files, so that builds do not change them."""
     copy = tmp_path_factory.mktemp("workspace") / "src" / PACKAGE
     listing = run(
         *("git", "-C", ROOT, "ls-files", "-z", "--cached", "--others", "--exclude-standard")
@@ -55,7 +57,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def pip_prefix(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A virtual environment with the package; its dependencies are those of this Python."""
+    """Return a virtual environment with the package and the dependencies of this Python."""
     prefix = tmp_path_factory.mktemp("pip") / "venv"
     venv.create(prefix, symlinks=True)
     python = prefix / "bin" / "python3"
@@ -70,19 +72,19 @@ def pip_prefix(source: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def colcon_prefix(source: Path) -> Path:
-    """The prefix of the package in a workspace that colcon has built."""
+    """Build a workspace with colcon; return the prefix of the package."""
     workspace = source.parent.parent
     colcon = Path(sys.executable).with_name("colcon")
-    quiet = {"env": environment(COLCON_HOME=str(workspace / "home")), "cwd": workspace}
-    assert "(ros.ament_python)" in run(colcon, "--log-base", "log", "list", **quiet)
-    run(colcon, "--log-base", "log", "build", **quiet)
+    options = {"env": environment(COLCON_HOME=str(workspace / "home")), "cwd": workspace}
+    assert "(ros.ament_python)" in run(colcon, "--log-base", "log", "list", **options)
+    run(colcon, "--log-base", "log", "build", **options)
     return workspace / "install" / PACKAGE
 
 
 def check_prefix(prefix: Path, env: dict[str, str]) -> None:
-    """Everything that `ros2 run` and `ros2 launch` look for lies under `prefix`."""
+    """Check that `prefix` contains all that `ros2 run` and `ros2 launch` need."""
     share = prefix / "share" / PACKAGE
-    assert run(sys.executable, "-c", FIND_AS_ROS2_RUN, env=env).split() == [
+    assert run(sys.executable, "-c", PRINT_AMENT_PREFIX, env=env).split() == [
         str(prefix),
         str(share),
     ]
@@ -98,8 +100,8 @@ def check_prefix(prefix: Path, env: dict[str, str]) -> None:
         assert file.stat().st_mode & 0o555 == 0o555
 
 
-def check_refusal(executable: Path, env: dict[str, str]) -> None:
-    """The program starts, and ends with status 2 and one line for a missing parameter file."""
+def check_rejection(executable: Path, env: dict[str, str]) -> None:
+    """Check that the program ends with status 2 and one line for a missing parameter file."""
     missing = "/nonexistent.yaml"
     done = subprocess.run(
         [executable, "--ros-args", "--params-file", missing],
@@ -115,16 +117,16 @@ def check_refusal(executable: Path, env: dict[str, str]) -> None:
 
 
 def node_programs() -> list[str]:
-    """The programs that are nodes, and so read a parameter file."""
+    """Return the programs that are nodes and read a parameter file."""
     return sorted(set(programs()) - {"noninteract"})
 
 
-def test_pip_installs_what_ros2_needs(pip_prefix: Path) -> None:
-    """`pip install .` leaves programs on the PATH, the ament index entry, share and lib."""
+def test_pip_installs_the_ros_prefix(pip_prefix: Path) -> None:
+    """`pip install .` installs programs on the PATH, ament index entry, share and lib."""
     check_prefix(pip_prefix, environment(AMENT_PREFIX_PATH=str(pip_prefix)))
     for name in programs():
         assert os.access(pip_prefix / "bin" / name, os.X_OK)
-    imported = run(pip_prefix / "bin" / "python3", "-P", "-c", PRINT_WHERE_IMPORTED)
+    imported = run(pip_prefix / "bin" / "python3", "-P", "-c", PRINT_PACKAGE_PATH)
     assert Path(imported.strip()).is_relative_to(pip_prefix)
     static = {file.name for file in (ROOT / PACKAGE / "console" / "static").iterdir()}
     page = Path(imported.strip()).parent / "console" / "static"
@@ -134,32 +136,32 @@ def test_pip_installs_what_ros2_needs(pip_prefix: Path) -> None:
 
 @pytest.mark.parametrize("name", node_programs())
 def test_programs_start_after_pip_install(pip_prefix: Path, name: str) -> None:
-    """What `ros2 run` would start is the installed program."""
-    check_refusal(pip_prefix / "lib" / PACKAGE / name, environment())
+    """`ros2 run` starts the installed program."""
+    check_rejection(pip_prefix / "lib" / PACKAGE / name, environment())
 
 
 def test_command_line_starts_after_pip_install(pip_prefix: Path) -> None:
-    """`ros2 run noninteract_ros noninteract` is the command line."""
+    """`ros2 run noninteract_ros noninteract` starts the command line."""
     assert "demo" in run(pip_prefix / "lib" / PACKAGE / "noninteract", "--help")
 
 
 def sourced(prefix: Path) -> dict[str, str]:
-    """The environment after `source install/local_setup.sh`."""
+    """Return the environment after `source install/local_setup.sh`."""
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     setup = prefix.parent / "local_setup.sh"
     printed = run("sh", "-c", f". {setup} && env -0", env=environment(PATH=path))
     return dict(entry.split("=", 1) for entry in printed.rstrip("\0").split("\0"))
 
 
-def test_colcon_installs_what_ros2_needs(colcon_prefix: Path) -> None:
-    """`colcon build` takes the package for ament_python and lays out the same prefix."""
+def test_colcon_installs_the_ros_prefix(colcon_prefix: Path) -> None:
+    """`colcon build` recognizes ament_python and installs the same prefix."""
     env = sourced(colcon_prefix)
     check_prefix(colcon_prefix, env)
-    imported = run(sys.executable, "-P", "-c", PRINT_WHERE_IMPORTED, env=env)
+    imported = run(sys.executable, "-P", "-c", PRINT_PACKAGE_PATH, env=env)
     assert Path(imported.strip()).is_relative_to(colcon_prefix)
 
 
 @pytest.mark.parametrize("name", node_programs())
 def test_programs_start_after_colcon_build(colcon_prefix: Path, name: str) -> None:
-    """What `ros2 run` would start is the program in the workspace."""
-    check_refusal(colcon_prefix / "lib" / PACKAGE / name, sourced(colcon_prefix))
+    """`ros2 run` starts the program of the workspace."""
+    check_rejection(colcon_prefix / "lib" / PACKAGE / name, sourced(colcon_prefix))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Puts the figures of a run side by side: python docs/images/compose.py RUN OUT.png.
+"""Compose figures of a run into one image: python docs/images/compose.py RUN OUT.png.
 
-So `paper.png` is made, of `noninteract demo paper`. `door.png` is `fig5_energy.png` of `door`,
-`link.png` that of `delayed_wall`, `dual_panda.png` is `motion.png` of `dual_panda`.
+`paper.png` is composed from a run of `noninteract demo paper`. `door.png` is `fig5_energy.png` of
+`door`, `link.png` that of `delayed_wall`, and `dual_panda.png` is `motion.png` of `dual_panda`.
 """
 
 import sys
@@ -18,7 +18,7 @@ FIGURES = ("fig2_cooperative", "fig3_relative", "fig4_storage", "paths")
 
 
 def main(run: Path, out: Path) -> None:
-    """Draws the four figures of a run into one image."""
+    """Draw the four figures of a run into one image."""
     figure, axes = plt.subplots(2, 2, figsize=(12, 8.4), layout="constrained")
     for axis, name in zip(axes.flat, FIGURES, strict=True):
         axis.imshow(imread(run / f"{name}.png"))

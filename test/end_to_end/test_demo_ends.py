@@ -73,5 +73,5 @@ def test_whoever_is_killed_nobody_is_left(victim: str, domain: int, tmp_path: Pa
         return
     assert status == 1
     assert re.search(f"noninteract: {victim} was ended by SIGKILL", told()), told()
-    assert f"recorded until then lies in {recording}" in told()
+    assert f"Recorded until the failure in {recording}" in told()
     assert repair(recording).intact == (victim != "recorder")

@@ -18,7 +18,7 @@ from std_msgs.msg import String
 
 from noninteract_ros.nodes.common.node import LOOP_QOS
 from noninteract_ros.nodes.common.program import run_program
-from noninteract_ros.nodes.recording.feed import RawSubscription
+from noninteract_ros.nodes.recording.raw_subscription import RawSubscription
 
 TOPIC = "/overrun"
 COUNT = 900

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder as a process of its own, and its node in this process."""
+"""Recorder as a process, and its node in this process."""
 
 import gc
 import os
@@ -22,7 +22,7 @@ from std_msgs.msg import String
 
 from noninteract_ros.errors import RecordingError
 from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
-from noninteract_ros.nodes.recording.feed import SequenceCheck
+from noninteract_ros.nodes.recording.raw_subscription import SequenceCheck
 from noninteract_ros.nodes.recording.recorder import RecorderNode
 from noninteract_ros.reporting.recording.repair import repair
 from noninteract_ros.reporting.recording.run import Run
@@ -33,7 +33,7 @@ DEADLINE = 30.0
 TICKS = 1000
 TOPICS = ("joint_states", "joint_commands", "cooperative/state")
 
-# Three topics at 1 kHz, as a run has them; says when it has begun and when all has arrived.
+# Publishes three topics at 1 kHz, as in a run, and ends when all messages are acknowledged.
 PUBLISHER = f"""
 import time, rclpy
 from rclpy.duration import Duration
@@ -52,7 +52,7 @@ for tick in range({TICKS}):
         message.position = [float(tick), float(number)]
         publisher.publish(message)
     if tick == 300:
-        print("going", flush=True)
+        print("publishing", flush=True)
     time.sleep(max(0.0, start + 0.001 * (tick + 1) - time.monotonic()))
 for publisher in publishers:
     publisher.wait_for_all_acked(Duration(seconds=5))
@@ -61,7 +61,7 @@ for publisher in publishers:
 
 @pytest.fixture
 def start(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., subprocess.Popen[str]]]:
-    """Starts Python processes in a domain of their own, and ends those that are left."""
+    """Return a function that starts Python processes in a separate domain."""
     monkeypatch.setenv("ROS_DOMAIN_ID", str(DOMAIN))
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
     started = []
@@ -84,10 +84,10 @@ def recorder_arguments(**parameters: object) -> list[str]:
 
 
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGTERM])
-def test_every_message_is_recorded_until_a_signal(
+def test_all_messages_are_recorded_until_a_signal(
     start: Callable[..., subprocess.Popen[str]], tmp_path: Path, ending: signal.Signals
 ) -> None:
-    """At 1 kHz on three topics nothing is lost, and a signal ends with a whole file, status 0."""
+    """No message on three topics at 1 kHz is lost; a signal completes the file with status 0."""
     scenario = tmp_path / "scenario.yaml"
     scenario.write_text("/**: {ros__parameters: {rate: 1000.0}}\n")
     path = tmp_path / "new" / "run.mcap"
@@ -112,15 +112,15 @@ def test_every_message_is_recorded_until_a_signal(
     assert (status["values"]["lost"], status["values"]["sent before the recorder"]) == ("0", "0")
 
 
-def test_a_killed_recorder_leaves_a_file_that_can_be_repaired(
+def test_the_file_of_a_killed_recorder_can_be_repaired(
     start: Callable[..., subprocess.Popen[str]], tmp_path: Path
 ) -> None:
-    """After kill -9 in the middle of a run, all but its last moments are there."""
+    """After SIGKILL during a run, all flushed messages are recovered."""
     path = tmp_path / "run.mcap"
     recorder = start(*recorder_arguments(output=path))
     publisher = start("-c", PUBLISHER)
     assert publisher.stdout is not None
-    assert publisher.stdout.readline() == "going\n"
+    assert publisher.stdout.readline() == "publishing\n"
     deadline = time.monotonic() + DEADLINE
     while path.stat().st_size < 10_000:
         assert time.monotonic() < deadline
@@ -136,7 +136,7 @@ def test_a_killed_recorder_leaves_a_file_that_can_be_repaired(
 
 
 @pytest.mark.parametrize(
-    ("parameters", "complaint"),
+    ("parameters", "reason"),
     [
         ({}, "run.mcap: exists and is not overwritten"),
         ({"output": "{}/run.mcap/run.mcap"}, "run.mcap/run.mcap: cannot be written"),
@@ -147,14 +147,14 @@ def test_a_killed_recorder_leaves_a_file_that_can_be_repaired(
         ({"overwrite": "7"}, "overwrite"),
     ],
 )
-def test_what_cannot_be_recorded_is_said_in_one_line(
+def test_an_invalid_parameter_is_reported_in_one_line(
     start: Callable[..., subprocess.Popen[str]],
     tmp_path: Path,
     parameters: dict[str, str],
-    complaint: str,
+    reason: str,
 ) -> None:
-    """A wrong parameter or path ends the program with status 2, and nothing is touched."""
-    (tmp_path / "run.mcap").write_bytes(b"precious")
+    """The program ends with status 2, and an existing file is unchanged."""
+    (tmp_path / "run.mcap").write_bytes(b"existing")
     given = {"output": "{}/run.mcap"} | parameters
     recorder = start(
         *recorder_arguments(**{key: value.format(tmp_path) for key, value in given.items()})
@@ -162,13 +162,12 @@ def test_what_cannot_be_recorded_is_said_in_one_line(
     _, error = recorder.communicate(timeout=DEADLINE)
     assert recorder.returncode == 2, error
     assert len(error.splitlines()) == 1
-    assert complaint in error
-    assert (tmp_path / "run.mcap").read_bytes() == b"precious"
+    assert reason in error
+    assert (tmp_path / "run.mcap").read_bytes() == b"existing"
 
 
 FULL_DISK = """
 import resource, sys
-from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
 from noninteract_ros.nodes.recording.recorder import main
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (30_000, 30_000))
@@ -176,12 +175,12 @@ sys.exit(main())
 """
 
 
-def test_a_full_disk_ends_the_recorder_with_the_reason(
+def test_a_full_disk_is_reported(
     start: Callable[..., subprocess.Popen[str]], tmp_path: Path
 ) -> None:
-    """Status 2, one line, and what was written before can be repaired."""
+    """The program ends with status 2 and one line, and the file can be repaired."""
     path = tmp_path / "run.mcap"
-    recorder = start("-c", FULL_DISK, *recorder_arguments(output=path)[2:])
+    recorder = start("-c", FULL_DISK, *recorder_arguments(output=path)[3:])
     start("-c", PUBLISHER)
     _, error = recorder.communicate(timeout=DEADLINE)
     assert recorder.returncode == 2
@@ -191,7 +190,7 @@ def test_a_full_disk_ends_the_recorder_with_the_reason(
 
 @pytest.fixture
 def ros() -> Iterator[tuple[Any, Callable[..., RecorderNode]]]:
-    """A node that publishes, and a maker of recorders, in a context of their own."""
+    """Return a publishing node and a factory of recorders in a separate context."""
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=DOMAIN, signal_handler_options=SignalHandlerOptions.NO)
@@ -220,38 +219,38 @@ def poll_until(recorder: RecorderNode, done: Callable[[], bool]) -> None:
         time.sleep(0.002)
 
 
-def test_topics_of_the_namespace_only(ros: Any, tmp_path: Path) -> None:
-    """Topics that appear are found; those of other namespaces are left alone."""
+def test_only_topics_of_the_namespace_are_recorded(ros: Any, tmp_path: Path) -> None:
+    """Topics are discovered while recording; those of other namespaces are ignored."""
     node, make = ros
     recorder = make(tmp_path / "run.mcap")
-    ours = node.create_publisher(JointState, "late/topic", 10)
+    own = node.create_publisher(JointState, "late/topic", 10)
     other = node.create_publisher(JointState, "/other/topic", 10)
-    poll_until(recorder, lambda: ours.get_subscription_count() > 0)
+    poll_until(recorder, lambda: own.get_subscription_count() > 0)
     other.publish(JointState())
-    ours.publish(JointState())
+    own.publish(JointState())
     poll_until(recorder, lambda: recorder.writer.topics == 2)
     recorder.finish()
     assert set(Run.open(tmp_path).topics) == {"/team/late/topic", "/diagnostics"}
 
 
-def test_best_effort_publishers_are_heard(ros: Any, tmp_path: Path) -> None:
-    """A publisher that offers no reliability is recorded all the same."""
+def test_best_effort_publishers_are_recorded(ros: Any, tmp_path: Path) -> None:
+    """The subscription adapts its reliability to the publisher."""
     node, make = ros
     recorder = make(tmp_path / "run.mcap", topics=["sensor sensor_msgs/msg/JointState"])
     qos = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
     publisher = node.create_publisher(JointState, "sensor", qos)
 
-    def heard() -> bool:
+    def recorded() -> bool:
         publisher.publish(JointState())
         return recorder.writer.topics == 2
 
-    poll_until(recorder, heard)
+    poll_until(recorder, recorded)
     recorder.finish()
     assert "/team/sensor" in Run.open(tmp_path).topics
 
 
-def test_what_was_said_once_before_the_recorder_is_kept(ros: Any, tmp_path: Path) -> None:
-    """A latched message, such as a robot's description, is recorded by who comes later."""
+def test_latched_messages_are_recorded(ros: Any, tmp_path: Path) -> None:
+    """A latched message sent before the recorder, such as a robot description, is recorded."""
     node, make = ros
     qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     node.create_publisher(JointState, "latched", qos).publish(JointState(name=["a"]))
@@ -261,8 +260,8 @@ def test_what_was_said_once_before_the_recorder_is_kept(ros: Any, tmp_path: Path
     assert "/team/latched" in Run.open(tmp_path).topics
 
 
-def test_descriptions_are_recorded_wherever_they_lie(ros: Any, tmp_path: Path) -> None:
-    """What the robots are belongs to a run, whoever says it."""
+def test_robot_descriptions_of_all_namespaces_are_recorded(ros: Any, tmp_path: Path) -> None:
+    """A run contains the descriptions of its robots, from any publisher."""
     node, make = ros
     node.create_publisher(String, "/arm/robot_description", LATCHED_QOS).publish(String(data="x"))
     recorder = make(tmp_path / "run.mcap")
@@ -272,8 +271,8 @@ def test_descriptions_are_recorded_wherever_they_lie(ros: Any, tmp_path: Path) -
     assert found == ["x"]
 
 
-def test_an_unknown_type_is_left_out(ros: Any, tmp_path: Path) -> None:
-    """A message package that is not installed costs its topic only, and is said."""
+def test_an_unknown_type_is_not_recorded(ros: Any, tmp_path: Path) -> None:
+    """A message type that is not installed affects its topic only, and is reported."""
     node, make = ros
     recorder = make(
         tmp_path / "run.mcap",
@@ -296,7 +295,7 @@ def test_an_unknown_type_is_left_out(ros: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("publishers", "numbers", "lost", "late"),
+    ("publishers", "numbers", "lost", "missed"),
     [
         (1, [1, 2, 3], 0, 0),
         (1, [4, 5, 6], 0, 3),
@@ -308,11 +307,11 @@ def test_an_unknown_type_is_left_out(ros: Any, tmp_path: Path) -> None:
         (2, [1, 2, 40, 3, 41, 44, 4], 2, 39),
     ],
 )
-def test_gaps_in_the_numbers_are_counted(
-    publishers: int, numbers: list[int], lost: int, late: int
+def test_gaps_in_sequence_numbers_are_counted(
+    publishers: int, numbers: list[int], lost: int, missed: int
 ) -> None:
-    """Gaps count as lost, a beginning above one as sent before, a restart as neither."""
+    """Gaps count as lost, a first number above 1 as missed, a restart as neither."""
     check = SequenceCheck(lambda: publishers)
     for number in numbers:
-        check.note(number)
-    assert (check.lost, check.late) == (lost, late)
+        check.update(number)
+    assert (check.lost, check.missed) == (lost, missed)

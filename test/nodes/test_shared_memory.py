@@ -6,7 +6,7 @@ import os
 import time
 from pathlib import Path
 
-from noninteract_ros.nodes.stack.shared_memory import YOUNG, remove_abandoned
+from noninteract_ros.nodes.stack.shared_memory import MIN_AGE, remove_abandoned
 
 
 def segment(folder: Path, name: str, age: float) -> Path:
@@ -20,7 +20,7 @@ def segment(folder: Path, name: str, age: float) -> Path:
 
 def test_only_segments_without_an_owner_are_removed(tmp_path: Path) -> None:
     """What is held, young, or of another kind stays."""
-    old = 10 * YOUNG
+    old = 10 * MIN_AGE
     segment(tmp_path, "fastrtps_0123456789abcdef", old)
     held = segment(tmp_path, "fastrtps_0123456789abcde0", old)
     segment(tmp_path, "fastrtps_0123456789abcde1", 0.0)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of `noninteract bench` that need ROS."""
+"""Benchmarks of nodes and programs for `noninteract bench`."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The parts of `noninteract bench` that need ROS: the controller's node, lockstep, wall time."""
+"""Benchmarks with ROS: controller node, lockstep tick and wall-time period."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -48,21 +48,21 @@ SLEEP = "absolute sleep alone, period error"
 
 
 class ControllerCycle:
-    """One lockstep tick of the controller's node: the bytes of all inputs in, its bytes out.
+    """One lockstep tick of the controller node, from serialized inputs to serialized outputs.
 
-    The callbacks are called as an executor would; what they publish is sent, but has no readers.
+    The callbacks are called as by an executor; published messages have no subscribers.
 
     Args:
         values: Values of a scenario.
-        material: The same scenario and its first ticks.
-        folder: Where the parameter file goes.
+        case: The same scenario and its first ticks.
+        folder: Folder of the parameter file.
     """
 
-    def __init__(self, values: Mapping[str, Any], material: BenchCase, folder: Path) -> None:
-        self._scenario = material.scenario
+    def __init__(self, values: Mapping[str, Any], case: BenchCase, folder: Path) -> None:
+        self._scenario = case.scenario
         self._team = self._scenario.build_team()
         self._stack = self._scenario.build_stack(self._team)
-        self._history = material.history
+        self._history = case.history
         self._joints = JointStateCodec(self._team.joint_names)
         self._codecs = {
             task.name: SubtaskCodec(task.name, task.elements, task.axes, task.rotates)
@@ -80,7 +80,7 @@ class ControllerCycle:
         self._calls: list[tuple[Callable[[Any], None], Any]] = []
 
     def prepare(self) -> None:
-        """All messages of the next tick."""
+        """Build all messages of the next tick."""
         self._tick += 1
         rate = self._scenario.general.rate
         stamp = tick_stamp(self._tick, rate)
@@ -99,39 +99,39 @@ class ControllerCycle:
     def _reference(self, subtask: str, stamp: int, row: int) -> bytes:
         number = self._stack.names.index(subtask)
         desired = self._history.desired[row][self._stack.value_slices[number]]
-        still = np.zeros(self._stack.subtasks[number].dim)
-        return self._codecs[subtask].encode(stamp, desired, still, still)
+        zero = np.zeros(self._stack.subtasks[number].dim)
+        return self._codecs[subtask].encode(stamp, desired, zero, zero)
 
     def _add(self, topic: str, data: bytes) -> None:
-        found = self._inputs[topic]
-        message = data if found.raw else deserialize_message(data, found.msg_type)
-        self._calls.append((found.callback, message))
+        subscription = self._inputs[topic]
+        message = data if subscription.raw else deserialize_message(data, subscription.msg_type)
+        self._calls.append((subscription.callback, message))
 
     def run(self) -> None:
-        """One tick."""
-        for take, message in self._calls:
-            take(message)
+        """Call all callbacks of one tick."""
+        for callback, message in self._calls:
+            callback(message)
 
     def close(self) -> None:
-        """Ends the node.
+        """Destroy the node.
 
         Raises:
-            StackError: It has not answered each tick, so that the times mean nothing.
+            StackError: The node has not computed all ticks, so that the times are invalid.
         """
         reached = self._node.status()[2]["time [s]"]
         self._node.destroy_node()
         self._node.context.try_shutdown()
         if reached != seconds(tick_stamp(self._tick, self._scenario.general.rate)):
-            raise StackError(f"the controller answered up to {reached} s of {self._tick} ticks")
+            raise StackError(f"the controller stopped at {reached} s of {self._tick} ticks")
 
 
-def node_rows(name: str, values: Mapping[str, Any], material: BenchCase, count: int) -> list[Row]:
-    """The controller's node on a scenario's team, and its floor."""
+def node_rows(name: str, values: Mapping[str, Any], case: BenchCase, count: int) -> list[Row]:
+    """Return the rows of the controller node on a scenario's team and of its baseline."""
     with TemporaryDirectory() as folder:
-        controller = ControllerCycle(values, material, Path(folder))
+        controller = ControllerCycle(values, case, Path(folder))
         node, terms = f"controller node, {name}", f"Pinocchio's terms beside the node, {name}"
-        things: dict[str, Timed] = {node: controller, terms: PinocchioTerms(material)}
-        times = take_turns(things, count)
+        timed: dict[str, Timed] = {node: controller, terms: PinocchioTerms(case)}
+        times = take_turns(timed, count)
         controller.close()
     return [Row("node", node, times[node], terms), Row("node", terms, times[terms])]
 
@@ -139,68 +139,68 @@ def node_rows(name: str, values: Mapping[str, Any], material: BenchCase, count: 
 def measure(
     parts: Sequence[str],
     settings: BenchSettings,
-    begin: Callable[[str], None],
-    leave_out: Callable[[str], None],
+    on_start: Callable[[str], None],
+    on_skip: Callable[[str], None],
 ) -> list[Row]:
-    """Rows of some parts, in the order of `PARTS`.
+    """Measure some parts and return their rows, in the order of `PARTS`.
 
     Args:
         parts: Some of `PARTS`.
-        settings: How much is measured.
-        begin: Told what is measured next.
-        leave_out: Told which scenario is left out, and why.
+        settings: Numbers of ticks and rounds, and durations.
+        on_start: Receives the name of the next measurement.
+        on_skip: Receives the name of a skipped scenario and the reason.
     """
     scenarios = bench_scenarios()
     paper, teams = scenarios["paper"], bench_teams() if "law" in parts else {}
     rows: list[Row] = []
     chosen = scenarios if {"law", "node"} & set(parts) else {}
     for name, values in (chosen | teams).items():
-        begin(f"law and controller node, {name}")
+        on_start(f"law and controller node, {name}")
         try:
-            material = BenchCase.of(values, settings.ticks + WARM_UP)
-        except ScenarioError as error:  # Models of robots are an extra.
-            leave_out(f"{name} is left out: {error}")
+            case = BenchCase.of(values, settings.ticks + WARM_UP)
+        except ScenarioError as error:  # Robot models are an optional dependency.
+            on_skip(f"{name} is skipped: {error}")
             continue
         if "law" in parts:
-            rows += law_rows(name, material, settings.ticks)
-        # Robots with topics of their own have no single state to be answered.
-        if "node" in parts and name not in teams and not material.scenario.has_robot_state_topics:
-            rows += node_rows(name, values, material, settings.ticks)
+            rows += law_rows(name, case, settings.ticks)
+        # With one state topic per robot there is no single input that completes a tick.
+        if "node" in parts and name not in teams and not case.scenario.has_robot_state_topics:
+            rows += node_rows(name, values, case, settings.ticks)
     if "lockstep" in parts:
-        begin("lockstep of the real programs")
+        on_start("lockstep of the real programs")
         rows += lockstep_rows("paper", paper, settings)
     if "wall" in parts:
-        begin("wall time")
+        on_start("wall time")
         rows += wall_rows("paper", paper, settings)
     return sorted(rows, key=lambda row: PARTS.index(row.part))
 
 
 def lockstep_rows(name: str, values: Mapping[str, Any], settings: BenchSettings) -> list[Row]:
-    """Wall time per tick of the real programs, without and with the recorder, and their floor."""
+    """Return wall time per tick of the programs, with and without recorder, and the baseline."""
     scenario = Scenario.from_dict(values)
-    things = {False: f"lockstep tick, {name}", True: f"lockstep tick, {name}, recorded"}
-    times: dict[str, list[Array]] = {name: [] for name in (*things.values(), ROUND_TRIP)}
+    labels = {False: f"lockstep tick, {name}", True: f"lockstep tick, {name}, recorded"}
+    times: dict[str, list[Array]] = {name: [] for name in (*labels.values(), ROUND_TRIP)}
     with ros(), TemporaryDirectory() as folder:
         running = {"lockstep": True, "end_time": 0.0, "start_paused": False}
         file = write(Path(folder) / SCENARIO, {**values, **running})
         trip = RoundTrip(scenario.build_team().joint_names)
         try:
             for _ in range(settings.rounds):
-                for record, thing in things.items():
+                for record, label in labels.items():
                     times[ROUND_TRIP].append(trip.measure(settings.seconds))
                     with programs(scenario, file, Path(folder), record) as stack:
-                        times[thing].append(tick_times(stack, settings.seconds))
+                        times[label].append(tick_times(stack, settings.seconds))
         finally:
             trip.close()
     rows = [
-        Row("lockstep", thing, np.concatenate(times[thing]), ROUND_TRIP)
-        for thing in things.values()
+        Row("lockstep", label, np.concatenate(times[label]), ROUND_TRIP)
+        for label in labels.values()
     ]
     return [*rows, Row("lockstep", ROUND_TRIP, np.concatenate(times[ROUND_TRIP]))]
 
 
 def wall_rows(name: str, values: Mapping[str, Any], settings: BenchSettings) -> list[Row]:
-    """Period error of the controller's commands in wall time, and that of sleeping alone."""
+    """Return period error of the controller's commands in wall time, and of sleeping alone."""
     scenario = Scenario.from_dict(values)
     loop = f"commands in wall time, {name}, period error"
     rate = scenario.general.rate
@@ -209,21 +209,22 @@ def wall_rows(name: str, values: Mapping[str, Any], settings: BenchSettings) -> 
         running = {"lockstep": False, "end_time": 0.0, "start_paused": False}
         file = write(Path(folder) / SCENARIO, {**values, **running})
         for _ in range(settings.rounds):
-            times[SLEEP].append(_errors(_sleeps(rate, settings.seconds), rate))
+            times[SLEEP].append(_period_errors(_sleep(rate, settings.seconds), rate))
             with programs(scenario, file, Path(folder), False) as stack:
-                times[loop].append(_errors(command_times(stack, settings.seconds), rate))
-    rows = {thing: np.concatenate(found) for thing, found in times.items()}
-    return [Row("wall", loop, rows[loop], SLEEP), Row("wall", SLEEP, rows[SLEEP])]
+                times[loop].append(_period_errors(command_times(stack, settings.seconds), rate))
+    errors = {label: np.concatenate(parts) for label, parts in times.items()}
+    return [Row("wall", loop, errors[loop], SLEEP), Row("wall", SLEEP, errors[SLEEP])]
 
 
-def _sleeps(rate: float, duration: float) -> list[int]:
-    wall_rate, instants = WallRate(rate), []
+def _sleep(rate: float, duration: float) -> list[int]:
+    """Return the wake-up times of a sleeping loop [ns]."""
+    wall_rate, wake_ups = WallRate(rate), []
     for _ in range(round(rate * duration)):
         wall_rate.sleep()
-        instants.append(time.time_ns())
-    return instants
+        wake_ups.append(time.time_ns())
+    return wake_ups
 
 
-def _errors(instants: list[int], rate: float) -> Array:
-    """How far each period is from the nominal one [us]."""
-    return np.abs(1e-3 * np.diff(instants) - 1e6 / rate)
+def _period_errors(times: list[int], rate: float) -> Array:
+    """Return the absolute error of each period [us]."""
+    return np.abs(1e-3 * np.diff(times) - 1e6 / rate)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The bare floor of lockstep: sends back every JointState that comes, as the bytes it came in."""
+"""Baseline of lockstep: a node that publishes every received JointState unchanged."""
 
 import sys
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from noninteract_ros.nodes.common.node import LOOP_QOS, spin
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Echoes `ping` on `pong` until it is told to end."""
+    """Echo `ping` on `pong` until the context is shut down."""
     rclpy.init(args=list(sys.argv if arguments is None else arguments))
     node = Node("echo", start_parameter_services=False, enable_rosout=False)
     publisher = node.create_publisher(JointState, "pong", LOOP_QOS)

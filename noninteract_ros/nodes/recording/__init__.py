@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The program `recorder`."""
+"""Node `recorder`: recording of a run into an MCAP file."""

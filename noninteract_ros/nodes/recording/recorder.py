@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recorder: writes every message of a run, as it came over the wire, into an MCAP file."""
+"""Node `recorder`: write all serialized messages of a run into an MCAP file."""
 
 import sys
 import time
@@ -20,40 +20,43 @@ from noninteract_ros.errors import InputError, NoninteractError, RecordingError
 from noninteract_ros.nodes.common.parameter_files import files_of
 from noninteract_ros.nodes.common.program import StopSignal, init
 from noninteract_ros.nodes.messages.messages import Level, to_diagnostics, to_status
-from noninteract_ros.nodes.recording.feed import RawSubscription
+from noninteract_ros.nodes.recording.raw_subscription import RawSubscription
 from noninteract_ros.reporting.recording.definitions import definition
 from noninteract_ros.reporting.recording.run import FILE_NAME
 from noninteract_ros.reporting.recording.writer import RunWriter
 
 GLOBAL_TOPICS = ("/diagnostics", "/clock")
 DESCRIPTION = "/robot_description"
-POLL_PERIOD = 0.004
-FLUSH_PERIOD = 0.5
-STATUS_PERIOD = 1.0
-SCAN_PERIOD = 0.2  # while topics still appear ...
-CALM_SCAN_PERIOD = 1.0  # ... and after none has appeared for a while
-CALM_SCANS = 10
-QUIET_TIME = 0.05  # at the end: what is on its way arrives within this time of silence ...
-LAST_CALL = 1.0  # ... but who keeps talking is not listened to for longer
+POLL_PERIOD = 0.004  # [s]
+FLUSH_PERIOD = 0.5  # [s]
+STATUS_PERIOD = 1.0  # [s]
+SCAN_PERIOD = 0.2  # [s] of the search for topics while new ones appear ...
+IDLE_SCAN_PERIOD = 1.0  # [s] ... and after so many scans without a new one:
+IDLE_SCANS = 10
+QUIET_TIME = 0.05  # [s] without a message, after which the recording ends ...
+DRAIN_TIMEOUT = 1.0  # [s] ... or this time after the stop, whichever is first
 
 PARAMETERS: dict[str, tuple[Any, str]] = {
-    "output": ("", "MCAP file to write; empty: runs/<date and time>/run.mcap"),
-    "overwrite": (False, "Whether a file that exists is replaced."),
-    "scenario_file": ("", "Scenario (YAML) to keep in the recording; empty: none."),
-    "topics": ([""], "Topics known beforehand: 'name type' each, such as 'joint_states "
-               "sensor_msgs/msg/JointState'; nothing of them is missed."),
+    "output": ("", "MCAP file to write; empty: runs/<date and time>/run.mcap."),
+    "overwrite": (False, "Replace an existing file."),
+    "scenario_file": ("", "Scenario (YAML) to store in the recording; empty: none."),
+    "topics": ([""], "Topics to subscribe to at the start, each as 'name type', such as "
+               "'joint_states sensor_msgs/msg/JointState'; none of their messages is missed."),
 }  # fmt: skip
 
 
 class RecorderNode(Node):
-    """Records all topics of its namespace, `/diagnostics` and `/clock`.
+    """Recorder of all topics of its namespace, all robot descriptions, `/diagnostics`, `/clock`.
 
-    It is not meant for an executor: `run` (or `poll`, every few milliseconds) empties all
-    subscriptions by hand, at a fraction of the cost.
+    The node needs no executor: `run`, or `poll` every few milliseconds, drains all subscriptions
+    at a fraction of the cost.
 
     Args:
-        scenario_file: What the parameter `scenario_file` is where nobody gives it.
+        scenario_file: Default of the parameter `scenario_file`.
         kwargs: Passed on to `rclpy.node.Node`.
+
+    Attributes:
+        writer: Writer of the file.
 
     Raises:
         RecordingError: The file exists or cannot be written, the scenario cannot be read, or a
@@ -67,10 +70,10 @@ class RecorderNode(Node):
             value = scenario_file if name == "scenario_file" else default
             descriptor = ParameterDescriptor(description=text, read_only=True)
             self.declare_parameter(name, value, descriptor)
-        self._feeds: dict[str, RawSubscription] = {}
+        self._raw_subscriptions: dict[str, RawSubscription] = {}
         self._skipped: dict[str, str] = {}
         self._state = "recording"
-        self._calm_scans = 0
+        self._idle_scans = 0
         self._next = dict.fromkeys(("scan", "flush", "status"), 0.0)
         known = [_known_topic(text) for text in self._value("topics") if text]
         scenario = self._scenario()
@@ -80,7 +83,7 @@ class RecorderNode(Node):
         self.writer = RunWriter(self._path(), scenario, self._value("overwrite"))
 
     def run(self, stopped: Callable[[], bool]) -> None:
-        """Records until told to stop, then finishes the file.
+        """Record until `stopped` returns True, then finish the file.
 
         Raises:
             RecordingError: The file cannot be written.
@@ -97,30 +100,32 @@ class RecorderNode(Node):
             raise
 
     def poll(self) -> int:
-        """Writes down what has arrived and does what is due; returns how many messages came.
+        """Write received messages and do periodic work; return the number of messages.
 
         Raises:
             RecordingError: The file cannot be written.
         """
-        taken = sum(feed.drain(self.writer.add) for feed in self._feeds.values())
-        if self._due("scan", SCAN_PERIOD if self._calm_scans < CALM_SCANS else CALM_SCAN_PERIOD):
+        taken = sum(item.drain(self.writer.add) for item in self._raw_subscriptions.values())
+        if self._is_due(
+            "scan", SCAN_PERIOD if self._idle_scans < IDLE_SCANS else IDLE_SCAN_PERIOD
+        ):
             self._scan()
-        if self._due("flush", FLUSH_PERIOD):
+        if self._is_due("flush", FLUSH_PERIOD):
             self.writer.flush()
-        if self._due("status", STATUS_PERIOD):
+        if self._is_due("status", STATUS_PERIOD):
             self._publish_status()
         return taken
 
     def finish(self) -> None:
-        """Takes what is still on its way and completes the file.
+        """Write messages that are still on their way, and finish the file.
 
         Raises:
             RecordingError: The file cannot be written.
         """
-        end = time.monotonic() + LAST_CALL
+        end = time.monotonic() + DRAIN_TIMEOUT
         quiet_since = time.monotonic()
         while time.monotonic() < min(end, quiet_since + QUIET_TIME):
-            if sum(feed.drain(self.writer.add) for feed in self._feeds.values()):
+            if sum(item.drain(self.writer.add) for item in self._raw_subscriptions.values()):
                 quiet_since = time.monotonic()
             time.sleep(POLL_PERIOD)
         self.writer.close()
@@ -130,8 +135,8 @@ class RecorderNode(Node):
 
     @property
     def lost(self) -> int:
-        """Messages that were sent to the recorder and never arrived."""
-        return sum(feed.sequence.lost for feed in self._feeds.values())
+        """Number of messages that were sent to the recorder and never arrived."""
+        return sum(item.sequence.lost for item in self._raw_subscriptions.values())
 
     def _value(self, name: str) -> Any:
         return self.get_parameter(name).value
@@ -148,54 +153,56 @@ class RecorderNode(Node):
         except (OSError, UnicodeDecodeError) as error:
             raise RecordingError(f"scenario_file {file}: cannot be read: {error}") from error
 
-    def _due(self, what: str, period: float) -> bool:
+    def _is_due(self, task: str, period: float) -> bool:
         now = time.monotonic()
-        if now < self._next[what]:
+        if now < self._next[task]:
             return False
-        self._next[what] = now + period
+        self._next[task] = now + period
         return True
 
     def _scan(self) -> None:
-        """Looks for topics that are new."""
-        self._calm_scans += 1
+        """Subscribe to new topics and match the QoS of all publishers."""
+        self._idle_scans += 1
         for topic, (type_name, *_) in self.get_topic_names_and_types():
-            ours = topic in GLOBAL_TOPICS or topic.startswith(
+            selected = topic in GLOBAL_TOPICS or topic.startswith(
                 f"{self.get_namespace().rstrip('/')}/"
             )
-            # Without what the robots are, nobody can make anything of a run.
-            ours = ours or topic.endswith(DESCRIPTION)
-            if ours and topic not in self._feeds and topic not in self._skipped:
-                self._calm_scans = 0
+            # A run cannot be evaluated without the descriptions of its robots.
+            selected = selected or topic.endswith(DESCRIPTION)
+            if selected and topic not in self._raw_subscriptions and topic not in self._skipped:
+                self._idle_scans = 0
                 self._subscribe(topic, type_name)
-        for feed in self._feeds.values():
-            feed.match_publishers()
+        for item in self._raw_subscriptions.values():
+            item.match_publishers()
 
     def _subscribe_known(self, name: str, type_name: str) -> None:
         try:
             validate_topic_name(name)
             self._subscribe(self.resolve_topic_name(name), type_name)
         except InvalidTopicNameException as error:
-            reason = " ".join(str(error).split())  # It draws a pointer on lines of its own.
+            reason = " ".join(
+                str(error).split()
+            )  # The text has several lines, with a pointer to the character.
             raise RecordingError(f"parameter topics: {reason}") from error
 
     def _subscribe(self, topic: str, type_name: str) -> None:
         try:
             definition(type_name)
-            self._feeds[topic] = RawSubscription(self, topic, type_name)
+            self._raw_subscriptions[topic] = RawSubscription(self, topic, type_name)
         except (InputError, RecordingError) as error:
             self._skipped[topic] = str(error)
             self.get_logger().warning(f"{topic} is not recorded: {error}")
 
     def _publish_status(self) -> None:
-        late = sum(feed.sequence.late for feed in self._feeds.values())
-        waits = [feed.longest_wait for feed in self._feeds.values()]
+        missed = sum(item.sequence.missed for item in self._raw_subscriptions.values())
+        waits = [item.longest_wait for item in self._raw_subscriptions.values()]
         values = {
             "file": self.writer.path,
             "messages": self.writer.messages,
             "bytes": self.writer.size,
             "topics": self.writer.topics,
             "lost": self.lost,
-            "sent before the recorder": late,
+            "sent before the recorder": missed,
             "longest wait [ms]": 1e3 * max(waits, default=0.0),
             "topics left out": len(self._skipped),
         }
@@ -203,12 +210,12 @@ class RecorderNode(Node):
         if level == Level.OK and (self.lost or self._skipped):
             level = Level.WARN
         status = to_status(self.get_fully_qualified_name(), level, self._state, values)
-        # Wall time, as that of the recorded messages; simulated time would need an executor.
+        # Wall time, like the recorded messages; simulated time would need an executor.
         self._diagnostics.publish(to_diagnostics(time.time_ns(), [status]))
 
 
 def _known_topic(text: str) -> tuple[str, str]:
-    """Name and type in an entry of the parameter `topics`."""
+    """Return name and type of an entry of the parameter `topics`."""
     parts = text.split()
     if len(parts) != 2:
         raise RecordingError(f"parameter topics: found {text!r}, allowed: 'name type'")
@@ -216,9 +223,9 @@ def _known_topic(text: str) -> tuple[str, str]:
 
 
 def main(args: Sequence[str] | None = None) -> int:
-    """Records until SIGINT or SIGTERM; exit status 2 where the file cannot be written.
+    """Record until SIGINT or SIGTERM; return 2 if the file cannot be written, else 0.
 
-    Without `scenario_file`, the first parameter file of the command line counts as the scenario.
+    The default of `scenario_file` is the first parameter file of the command line.
     """
     stop = StopSignal()
     argv = list(sys.argv if args is None else args)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start, supervision and end of all programs of a run."""
+"""Start, monitoring and shutdown of all programs of a run."""

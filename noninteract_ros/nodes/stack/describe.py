@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenarios whose robots are described on topics, for who runs no program."""
+"""Robot descriptions from topics for commands that run no node."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -11,15 +11,15 @@ from noninteract_ros.nodes.common.descriptions import RobotDescriptions
 from noninteract_ros.nodes.common.node import NAMESPACE
 
 
-def described(values: Mapping[str, Any], timeout: float) -> dict[str, Any]:
-    """Nested values of a scenario with all descriptions in place.
+def with_descriptions(values: Mapping[str, Any], timeout: float) -> dict[str, Any]:
+    """Return the nested values of a scenario with all robot descriptions filled in.
 
     Args:
         values: Nested values.
-        timeout: How long descriptions are waited for [s].
+        timeout: Time to wait for the descriptions [s].
 
     Raises:
-        ScenarioError: One does not come, or does not fit the scenario.
+        ScenarioError: A description is not received or does not fit the scenario.
     """
     rclpy.init(signal_handler_options=rclpy.SignalHandlerOptions.ALL)
     try:

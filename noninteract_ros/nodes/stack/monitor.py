@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Watches a stack from outside: who is there, who hears whom, how far the run is."""
+"""Monitoring of a stack: nodes, connections and progress of a run."""
 
 import time
 from collections.abc import Callable
@@ -18,12 +18,18 @@ from noninteract_ros.nodes.messages.messages import Level
 
 
 class StackError(NoninteractError):
-    """The programs of a run do not work together; the text says who and why."""
+    """A program of a run failed; the text names it and the reason."""
 
 
 @dataclass(frozen=True)
 class NodeStatus:
-    """Newest diagnostics of one node."""
+    """Newest diagnostics of one node.
+
+    Attributes:
+        level: Level of its DiagnosticStatus.
+        text: Its message.
+        values: Its key-value pairs.
+    """
 
     level: Level
     text: str
@@ -31,35 +37,38 @@ class NodeStatus:
 
 
 class Monitor:
-    """A node beside the stack, spun only inside its own methods.
+    """Node beside the stack; it spins only inside its own methods.
 
     Args:
         namespace: Namespace of the stack.
-        problem: Tells what went wrong with a program, or an empty text.
+        failure: Returns the failure of a program, or an empty text.
+
+    Attributes:
+        status: Newest diagnostics of each node.
     """
 
-    def __init__(self, namespace: str, problem: Callable[[], str]) -> None:
+    def __init__(self, namespace: str, failure: Callable[[], str]) -> None:
         self._prefix = f"/{namespace}"
-        self._problem = problem
+        self._failure = failure
         self._node = Node("demo", namespace=namespace)
         self._executor = SingleThreadedExecutor()
         self._executor.add_node(self._node)
         self.status: dict[str, NodeStatus] = {}
-        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._note, 50)
+        self._node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, 50)
 
-    def _note(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for item in message.status:
             values = {pair.key: pair.value for pair in item.values}
             name = item.name.rpartition("/")[2]
             self.status[name] = NodeStatus(Level(item.level[0]), item.message, values)
 
     def close(self) -> None:
-        """Ends the node."""
+        """Destroy the node."""
         self._executor.shutdown(0.5)
         self._node.destroy_node()
 
     def spin(self, seconds: float) -> None:
-        """Listens for a while.
+        """Spin for a duration [s].
 
         Raises:
             StackError: A program has ended.
@@ -67,21 +76,21 @@ class Monitor:
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0 and rclpy.ok():
             self._executor.spin_once(timeout_sec=left)
-        if problem := self._problem():
-            raise StackError(problem)
+        if failure := self._failure():
+            raise StackError(failure)
 
-    def others(self, seconds: float) -> list[str]:
-        """Nodes that are in the namespace already, listened for so long [s]."""
+    def other_nodes(self, seconds: float) -> list[str]:
+        """Return other nodes in the namespace, discovered within a duration [s]."""
         self.spin(seconds)
         found = self._node.get_node_names_and_namespaces()
         own = self._node.get_name()
-        return [name for name, space in found if space == self._prefix and name != own]
+        return [name for name, namespace in found if namespace == self._prefix and name != own]
 
     def wait_until_ready(self, names: list[str], timeout: float) -> None:
-        """Waits until every node is there and every publisher has found all its subscribers.
+        """Wait until all nodes publish diagnostics and all publishers match their subscriptions.
 
         Raises:
-            StackError: A program has ended, or the time is over.
+            StackError: A program has ended, or the timeout has elapsed.
         """
         deadline = time.monotonic() + timeout
         while (missing := self._missing(names)) and rclpy.ok():
@@ -90,40 +99,41 @@ class Monitor:
             self.spin(0.1)
 
     def _missing(self, names: list[str]) -> str:
+        """Return the first missing node or connection, or an empty text."""
         for name in names:
             if name not in self.status:
-                return f"{name} does not speak"
+                return f"no diagnostics of {name}"
         for name in set(names) - {"recorder"}:
             for entry in self.status[name].values["subscribers"].split(", "):
                 topic, _, count = entry.rpartition(" ")
-                listeners = self._node.get_subscriptions_info_by_topic(topic)
+                subscriptions = self._node.get_subscriptions_info_by_topic(topic)
                 if topic.startswith(f"{self._prefix}/") and (
-                    int(count) != len(listeners)
-                    or "recorder" not in [item.node_name for item in listeners]
+                    int(count) != len(subscriptions)
+                    or "recorder" not in [item.node_name for item in subscriptions]
                 ):
-                    return f"{topic} of {name} has {count} of {len(listeners)} subscribers"
+                    return f"{topic} of {name} has {count} of {len(subscriptions)} subscribers"
         return ""
 
-    def begin(self, timeout: float) -> None:
-        """Lets the paused team go.
+    def unpause(self, timeout: float) -> None:
+        """Start the paused team.
 
         Raises:
-            StackError: The team does not answer.
+            StackError: The team does not respond.
         """
         client = self._node.create_client(SetBool, "robot_team/pause")
         if not client.wait_for_service(timeout):
-            raise StackError("robot_team offers no service ~/pause")
-        answer: Any = client.call_async(SetBool.Request(data=False))
-        self._executor.spin_until_future_complete(answer, timeout)
-        if not answer.done() or not answer.result().success:
-            raise StackError("robot_team did not answer ~/pause")
+            raise StackError("service robot_team/pause is not available")
+        future: Any = client.call_async(SetBool.Request(data=False))
+        self._executor.spin_until_future_complete(future, timeout)
+        if not future.done() or not future.result().success:
+            raise StackError("robot_team/pause did not respond")
 
     def time(self) -> float:
-        """The team's time, as last heard [s]."""
+        """Return the last received time of the team [s]."""
         team = self.status.get("robot_team")
         return float(team.values["time [s]"]) if team else 0.0
 
     def finished(self) -> bool:
-        """Whether the team has come to its end."""
+        """Return True if the team has finished."""
         team = self.status.get("robot_team")
         return team is not None and team.text == FINISHED

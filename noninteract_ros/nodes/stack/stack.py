@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The programs of a scenario, started together: as processes of their own, or in this one."""
+"""Start and shutdown of a scenario's programs, as processes or in this process."""
 
 import os
 import signal
@@ -30,11 +30,11 @@ NODES: dict[str, Callable[[], ScenarioNode]] = {
     "haptic_emulator": HapticEmulator,
     "relative_planner": RelativePlanner,
 }
-GRACE = 10.0  # [s] time a program is given to end by itself
+SHUTDOWN_TIMEOUT = 10.0  # [s] after SIGINT, before SIGKILL
 
 
-def programs_of(scenario: Scenario) -> list[str]:
-    """Nodes that a scenario needs, besides the recorder."""
+def scenario_programs(scenario: Scenario) -> list[str]:
+    """Return the programs that a scenario needs, without the recorder."""
     names = ["robot_team", "controller"]
     names += ["haptic_emulator"] if scenario.haptic else []
     names += ["relative_planner"] if scenario.planner else []
@@ -42,24 +42,24 @@ def programs_of(scenario: Scenario) -> list[str]:
 
 
 class Stack(Protocol):
-    """Running programs."""
+    """Running programs of a scenario."""
 
-    def problem(self) -> str:
-        """What went wrong with a program, or an empty text."""
+    def failure(self) -> str:
+        """Return the failure of a program, or an empty text."""
 
     def stop(self) -> None:
-        """Ends all programs; the recorder last, so that it hears everything."""
+        """Shut down all programs; the recorder last, so that it records everything."""
 
 
 class Processes:
-    """Each program a process, with its log in `<out>/logs`.
+    """Programs as processes, with logs in `<out>/logs`.
 
     Args:
-        names: Nodes to start.
+        names: Programs to start.
         scenario_file: Their parameter file.
-        out: Output folder; the recording goes to `run.mcap` in it.
-        record: Whether there is a recorder.
-        namespace: Where the programs live.
+        out: Output folder; the recording is `run.mcap` in it.
+        record: Start a recorder too.
+        namespace: Namespace of the programs.
     """
 
     def __init__(
@@ -84,8 +84,8 @@ class Processes:
     def _start(self, name: str, arguments: list[str]) -> None:
         command = [sys.executable, "-m", "noninteract_ros.nodes", name, *arguments]
         with (self._logs / f"{name}.log").open("wb") as log:
-            # A session of its own: Ctrl-C at the terminal reaches the demo alone, which then
-            # ends the programs in order.
+            # In a new session, Ctrl-C at the terminal reaches the demo only, which then shuts
+            # the programs down in order.
             self._processes[name] = subprocess.Popen(
                 command,
                 stdin=subprocess.DEVNULL,
@@ -95,11 +95,11 @@ class Processes:
                 env=os.environ | {STARTER: str(os.getpid())},
             )
 
-    def problem(self) -> str:
-        """Which program has ended, with the last lines of its log."""
+    def failure(self) -> str:
+        """Return the name of a program that has ended, with the last lines of its log."""
         for name, process in self._processes.items():
             if process.poll() is not None:
-                return f"{name} {_end_of(process.returncode)}: {self._tail(name)}"
+                return f"{name} {_exit_text(process.returncode)}: {self._tail(name)}"
         return ""
 
     def _tail(self, name: str) -> str:
@@ -107,40 +107,40 @@ class Processes:
         return " / ".join(lines[-3:]) or "its log is empty"
 
     def stop(self) -> None:
-        """SIGINT to all, the recorder last; SIGKILL to whom that does not end."""
+        """Send SIGINT to all programs, the recorder last, and SIGKILL to those that do not end."""
         recorder = self._processes.pop("recorder", None)
-        _end(list(self._processes.values()))
+        _terminate(list(self._processes.values()))
         self._processes.clear()
         if recorder is not None:
-            _end([recorder])
+            _terminate([recorder])
 
 
-def _end_of(status: int) -> str:
-    """How a process has ended, in words."""
+def _exit_text(status: int) -> str:
+    """Return a description of an exit status."""
     if status >= 0:
         return f"ended with status {status}"
     return f"was ended by {signal.Signals(-status).name}"
 
 
-def _end(processes: list[subprocess.Popen[bytes]]) -> None:
+def _terminate(processes: list[subprocess.Popen[bytes]]) -> None:
     for process in processes:
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
     for process in processes:
         try:
-            process.wait(GRACE)
+            process.wait(SHUTDOWN_TIMEOUT)
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
 
 
 class InProcess:
-    """All programs in this process: one executor in a thread, the recorder in another.
+    """Programs as nodes of this process: one executor in a thread, the recorder in another.
 
     Args:
-        names: Nodes to start; the context must know their parameter file.
+        names: Nodes to start; the context must have their parameter file.
         out: Output folder.
-        scenario_file: Kept in the recording.
+        scenario_file: Scenario that is stored in the recording.
     """
 
     def __init__(self, names: list[str], out: Path, scenario_file: Path) -> None:
@@ -171,17 +171,17 @@ class InProcess:
         self._threads[name] = threading.Thread(target=run, daemon=True, name=name)
         self._threads[name].start()
 
-    def problem(self) -> str:
-        """What a thread raised."""
+    def failure(self) -> str:
+        """Return what a thread raised, or an empty text."""
         return self._failure
 
     def stop(self) -> None:
-        """Finishes the recording; the nodes end with the context."""
+        """Finish the recording, then shut down the nodes with their context."""
         self._stopping.set()
-        self._threads["recorder"].join(GRACE)
+        self._threads["recorder"].join(SHUTDOWN_TIMEOUT)
         self._executor.shutdown(0.5)
         for node in self._nodes:
             node.context.try_shutdown()
-        deadline = time.monotonic() + GRACE
+        deadline = time.monotonic() + SHUTDOWN_TIMEOUT
         for thread in self._threads.values():
             thread.join(max(0.0, deadline - time.monotonic()))

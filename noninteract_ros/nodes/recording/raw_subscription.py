@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One topic as raw bytes, taken without an executor, with a count of what did not arrive."""
+"""Raw subscription without an executor, with a count of lost messages."""
 
 import importlib
 import time
@@ -11,64 +11,65 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from noninteract_ros.errors import InputError
 
-DEPTH = 5000  # five seconds of a 1 kHz topic
-BATCH = 1000  # messages at a time, so that one topic cannot starve the others
+QUEUE_DEPTH = 5000  # five seconds of a 1 kHz topic
+BATCH_SIZE = 1000  # messages at a time, so that one topic cannot starve the others
 
+# Topic, type, times of reception and publication [ns], serialized message, sequence number.
 Store = Callable[[str, str, int, int, bytes, int], None]
 
 
 class SequenceCheck:
-    """Finds gaps in the numbers that publishers give their messages on one topic.
+    """Detector of gaps in the sequence numbers of one topic.
 
-    A message does not tell its publisher, so numbers are matched with those expected next: exact
-    with one publisher on the topic, a close estimate with more.
+    A message does not identify its publisher, so that numbers are matched with those expected
+    next: exact with one publisher on the topic, a close estimate with more.
 
     Args:
-        publishers: Returns how many publishers the topic has now.
+        publishers: Returns the current number of publishers of the topic.
 
     Attributes:
-        lost: Messages that were sent to this reader and never arrived.
-        late: Messages that their publishers sent before this reader was there.
+        lost: Number of messages that were sent to this subscription and never arrived.
+        missed: Number of messages that were sent before this subscription matched.
     """
 
     def __init__(self, publishers: Callable[[], int]) -> None:
         self._publishers = publishers
-        self._expected: list[int] = []  # one for each publisher, the latest heard last
+        self._expected: list[int] = []  # One for each publisher, in the order of reception.
         self.lost = 0
-        self.late = 0
+        self.missed = 0
 
-    def note(self, number: int) -> None:
-        """Takes the number of the message that came."""
+    def update(self, number: int) -> None:
+        """Process the sequence number of a received message."""
         if number in self._expected:
             self._expected.remove(number)
         else:
-            self._jump(number)
+            self._handle_gap(number)
         self._expected.append(number + 1)
 
-    def _jump(self, number: int) -> None:
+    def _handle_gap(self, number: int) -> None:
         before = [expected for expected in self._expected if expected < number]
         publishers = max(1, self._publishers())
         if before and len(self._expected) >= publishers:
             self.lost += number - max(before)
             self._expected.remove(max(before))
         else:
-            self.late += number - 1
-            # Whoever is new may stand in for one that has gone.
+            self.missed += number - 1
+            # A new publisher may replace one that has ended.
             del self._expected[: max(0, len(self._expected) - publishers + 1)]
 
 
 class RawSubscription:
-    """A raw subscription that is emptied by hand: about a quarter of an executor's cost.
+    """Raw subscription that is polled, at about a quarter of an executor's cost.
 
     Args:
         node: Node that subscribes.
-        topic: Full name.
-        type_name: E.g. `sensor_msgs/msg/JointState`.
+        topic: Fully qualified name of the topic.
+        type_name: Type of its messages, such as `sensor_msgs/msg/JointState`.
 
     Attributes:
         sequence: Count of lost messages.
-        longest_wait: Longest time that a message waited to be taken [s]; large where this
-            process is overloaded, before anything is lost.
+        longest_wait: Longest time between reception and `drain` of a message [s]. It grows when
+            this process is overloaded, before messages are lost.
 
     Raises:
         InputError: The message type is not installed.
@@ -85,56 +86,59 @@ class RawSubscription:
         self._subscription = self._subscribe()
 
     def match_publishers(self) -> None:
-        """Asks for less where a publisher offers less: else nothing of it would arrive.
+        """Adapt the QoS to the publishers and subscribe again if it has changed.
 
-        Where all keep what they said for who comes later, it is asked for.
+        The reliability is best effort where a publisher offers no more, else nothing of it would
+        arrive. The durability is transient local where all publishers offer it.
         """
-        best_effort, kept = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL
-        asked = (self._reliability, self._durability)
+        best_effort, latched = ReliabilityPolicy.BEST_EFFORT, DurabilityPolicy.TRANSIENT_LOCAL
+        before = (self._reliability, self._durability)
         offers = [
             offer.qos_profile for offer in self._node.get_publishers_info_by_topic(self.topic)
         ]
         if any(offer.reliability == best_effort for offer in offers):
             self._reliability = best_effort
         if offers:
-            all_kept = all(offer.durability == kept for offer in offers)
-            self._durability = kept if all_kept else DurabilityPolicy.VOLATILE
-        if asked != (self._reliability, self._durability):
+            all_latched = all(offer.durability == latched for offer in offers)
+            self._durability = latched if all_latched else DurabilityPolicy.VOLATILE
+        if before != (self._reliability, self._durability):
             self._node.destroy_subscription(self._subscription)
             self._subscription = self._subscribe()
 
     def drain(self, store: Store) -> int:
-        """Takes what has arrived and hands it to `store`; returns how many messages."""
+        """Pass received messages to `store`, at most `BATCH_SIZE`; return their number."""
         taken = 0
         handle = self._subscription.handle
         with handle:
-            while taken < BATCH and (found := handle.take_message(self._type, True)):
+            while taken < BATCH_SIZE and (found := handle.take_message(self._type, True)):
                 data, info = found
-                self._hand_over(store, data, info)
+                self._store(store, data, info)
                 taken += 1
         return taken
 
-    def _hand_over(self, store: Store, data: bytes, info: dict[str, Any]) -> None:
+    def _store(self, store: Store, data: bytes, info: dict[str, Any]) -> None:
         now = time.time_ns()
-        # Middleware that knows no such times reports zero.
+        # Middleware without these times reports zero.
         received = info["received_timestamp"] or now
         sent = info["source_timestamp"] or received
         number = info["publication_sequence_number"] or 0
         if number:
-            self.sequence.note(number)
+            self.sequence.update(number)
         self.longest_wait = max(self.longest_wait, (now - received) * 1e-9)
         store(self.topic, self.type_name, received, sent, data, number)
 
     def _subscribe(self) -> Any:
-        qos = QoSProfile(depth=DEPTH, reliability=self._reliability, durability=self._durability)
+        qos = QoSProfile(
+            depth=QUEUE_DEPTH, reliability=self._reliability, durability=self._durability
+        )
         return self._node.create_subscription(self._type, self.topic, _unused, qos, raw=True)
 
 
 def message_type(type_name: str) -> type:
-    """The Python class of a message type.
+    """Return the Python class of a message type.
 
     Raises:
-        InputError: There is none here.
+        InputError: The type is not installed.
     """
     try:
         package, kind, name = type_name.split("/")
@@ -147,4 +151,4 @@ def message_type(type_name: str) -> type:
 
 
 def _unused(message: bytes) -> None:
-    """Subscriptions must have a callback; no executor ever calls it."""
+    """Satisfy the subscription, which requires a callback; no executor calls it."""
