@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings of runs, and the metrics and figures that are made of them."""
+"""Recordings of runs, and metrics and figures computed from them."""

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Checks of the law and of scenarios before anything moves."""
+"""Validation of the law and of scenarios before operation."""

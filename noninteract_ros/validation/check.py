@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`noninteract check`: what can be said of a scenario, or of the law, before anything moves."""
+"""`noninteract check`: static checks of a scenario or of the law."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -14,15 +14,14 @@ from noninteract_ros.reporting.checks.checks import at_least, at_most
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.files import find_scenario, load_scenario
 from noninteract_ros.team.team import Team
-from noninteract_ros.validation.delay.delay import check_delay
+from noninteract_ros.validation.delay import check_delay
 from noninteract_ros.validation.gauntlet.settings import GauntletSettings
-from noninteract_ros.validation.identities.identities import identities
-from noninteract_ros.validation.identities.identity_check import check_identities
+from noninteract_ros.validation.identities.identities import check_identities, identities
 from noninteract_ros.validation.identities.law_probe import LawProbe
 
-STATES = 20  # random states, unless another number is asked for
-NEAREST = 5  # pairs of bodies that are listed
-SINGULAR = 1e-6  # smallest singular value below which the subtasks count as dependent
+STATES = 20  # default number of random states
+NEAREST = 5  # number of listed pairs of bodies
+SINGULAR = 1e-6  # smallest singular value of independent subtasks
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class CheckSettings:
     """Options of a check.
 
     Attributes:
-        samples: Number of random states; None leaves it to the check.
+        samples: Number of random states; None uses the default of the check.
         seed: Seed of the random states.
         gauntlet: Options of the gauntlet.
     """
@@ -54,7 +53,7 @@ def _gauntlet(settings: CheckSettings, scenarios: Sequence[str]) -> CheckReport:
     return check_gauntlet(settings.gauntlet)
 
 
-# Checks that are called by a name of their own, with the scenarios that were given for them.
+# Built-in checks by name; they receive the scenarios of the command line.
 BUILT_IN: dict[str, Callable[[CheckSettings, Sequence[str]], CheckReport]] = {
     "identities": _identities,
     "delay": _delay,
@@ -66,12 +65,12 @@ def run_check(target: str, settings: CheckSettings, others: Sequence[str] = ()) 
     """Run a built-in check, or check the scenario of that name or file.
 
     Args:
-        target: Name of a built-in check, or a scenario.
+        target: Name of a built-in check, or name or file of a scenario.
         settings: Options.
         others: Scenarios for a built-in check.
 
     Raises:
-        ScenarioError: The target is neither, or a scenario is wrong.
+        ScenarioError: The target is neither, or a scenario is invalid.
     """
     if target in BUILT_IN:
         return BUILT_IN[target](settings, others)
@@ -84,7 +83,7 @@ def run_check(target: str, settings: CheckSettings, others: Sequence[str] = ()) 
 
 
 def check_scenario(name: str, scenario: Scenario, settings: CheckSettings) -> CheckReport:
-    """Dimensions, modes and the identities of the law for a scenario's team."""
+    """Check singular values, sampled loops and the identities of the law for a scenario."""
     team = scenario.build_team()
     stack = scenario.build_stack(team)
     mode = scenario.build_controller(team, stack).mode

@@ -138,7 +138,7 @@ def test_the_file_of_a_killed_recorder_can_be_repaired(
 @pytest.mark.parametrize(
     ("parameters", "reason"),
     [
-        ({}, "run.mcap: exists and is not overwritten"),
+        ({}, "run.mcap: file exists"),
         ({"output": "{}/run.mcap/run.mcap"}, "run.mcap/run.mcap: cannot be written"),
         ({"scenario_file": "{}/nothing.yaml"}, "nothing.yaml: cannot be read"),
         ({"topics": "[joint_states]"}, "parameter topics: found 'joint_states'"),

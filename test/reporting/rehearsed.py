@@ -89,7 +89,7 @@ def record(
     extra: Callable[[RunWriter], None] | None = None,
     acts: Mapping[float, Act] | None = None,
 ) -> Run:
-    """Rehearses a scenario for a time [s] and records all topics of the run.
+    """Rehearse a scenario for a time [s] and records all topics of the run.
 
     Acts are done at their times [s], as a person does who leads the team from a console.
     """
@@ -140,7 +140,7 @@ class _Recording:
             self._writer.add(f"/team/{topic}", kind, time, time, encode(*found))
 
     def run(self, duration: float) -> None:
-        self._speak(duration)
+        self._add_references(duration)
         simulation = self._rehearsal.simulation
         for tick in range(round(duration * self._rate)):
             now = tick_stamp(tick, self._rate)
@@ -160,27 +160,27 @@ class _Recording:
                 lambda a, t=now: self._joints.encode(t, effort=a), result.torque,
             )  # fmt: skip
             if tick % self._period == 0:
-                self._tell(now, result, wrenches)
+                self._add_telemetry(now, result, wrenches)
         values = {"law": self._rehearsal.controller.mode.law}
         status = to_status("/team/controller", Level.OK, "running", values)
         message = to_diagnostics(1, [status])
         self._writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(message))
 
-    def _speak(self, duration: float) -> None:
+    def _add_references(self, duration: float) -> None:
         for number, (subtask, source, sampler) in enumerate(self._sources):
             announcer = Announcer(sampler, self._rate)
             announcer.reset(0.0)
             codec = next(codec for codec in self._codecs if codec.name == subtask)
             assert number < 2
-            for time, said in announcer.announce(duration):
-                if said is not None:
-                    motion = said.position, said.velocity, said.acceleration
+            for time, reference in announcer.announce(duration):
+                if reference is not None:
+                    motion = reference.position, reference.velocity, reference.acceleration
                     self._add(
                         f"{subtask}/{source}/reference", MOTION, time,
                         lambda *a, c=codec, t=time: c.encode(t, *a), *motion,
                     )  # fmt: skip
 
-    def _tell(self, now: int, tick: Any, wrenches: np.ndarray) -> None:
+    def _add_telemetry(self, now: int, tick: Any, wrenches: np.ndarray) -> None:
         team, stack = self._rehearsal.team, self._rehearsal.stack
         for name, wrench in zip(team.names, wrenches, strict=True):
             self._add(
@@ -200,9 +200,9 @@ class _Recording:
                 wanted.position, wanted.velocity, wanted.acceleration,
             )  # fmt: skip
             self._add(f"{codec.name}/energy", LABELLED, now, self._energy.encode, accounts[i])
-        self._tell_account(now, tick, team.external_torque(tick.state, wrenches))
+        self._add_account(now, tick, team.external_torque(tick.state, wrenches))
 
-    def _tell_account(self, now: int, tick: Any, external: np.ndarray) -> None:
+    def _add_account(self, now: int, tick: Any, external: np.ndarray) -> None:
         """What the controller tells of the port where the team is touched."""
         supplied = float(tick.error.e_rate @ tick.dynamics.force_of(external))
         self._measured += supplied * self._period / self._rate
@@ -215,8 +215,8 @@ def reference(codec: SubtaskCodec, time: float, position: np.ndarray) -> bytes:
     return codec.encode(stamp(time), position, 0 * position, 0 * position)
 
 
-def told(change: Callable[[dict[str, float]], None]) -> Tamper:
-    """Changes the account of the team that a run records, by label."""
+def tamper_account(change: Callable[[dict[str, float]], None]) -> Tamper:
+    """Change the account of the team that a run records, by label."""
 
     def tamper(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         if topic == "energy":

@@ -52,7 +52,7 @@ def test_torques_are_drawn_as_shares_of_their_limits(arms: Recorded) -> None:
         np.testing.assert_allclose(data[:, 1], own.max(axis=1), rtol=1e-12)
     drawn = [line.get_ydata() for line in shares.lines if str(line.get_label()).startswith("_")]
     np.testing.assert_allclose(np.sort(drawn, axis=0), np.sort(expected.T, axis=0), rtol=1e-12)
-    assert shares.get_ylabel() == "torque\n[share of its limit]"
+    assert shares.get_ylabel() == "torque / limit"
     assert shares.get_ylim() == (0.0, 1.05)  # The limit itself is in the picture.
     assert shares.figure.legends
 

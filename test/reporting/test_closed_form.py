@@ -28,7 +28,7 @@ def deviation(folder: Path, subtask: str, **changes: object) -> float:
 
 
 def test_the_papers_equations_hold_and_the_deviation_halves_with_the_tick(tmp_path: Path) -> None:
-    """Holding the torque over a tick is of first order, in both subtasks."""
+    """HoldForce the torque over a tick is of first order, in both subtasks."""
     for subtask in ("cooperative", "relative"):
         coarse, fine = (
             deviation(tmp_path, subtask, rate=rate, haptic__update_rate=rate)
@@ -105,8 +105,8 @@ def test_where_it_says_nothing_it_says_why(tmp_path: Path) -> None:
 
     cases = [
         (scenario_values(law="natural"), None, "natural does not decouple"),
-        (scenario_values(), foreign, "references at other instants"),
-        (scenario_values(planner=None), None, "nothing leads it"),
+        (scenario_values(), foreign, "references with unexpected stamps"),
+        (scenario_values(planner=None), None, "no two consecutive references"),
     ]
     for values, extra, reason in cases:
         recorded = Recorded(record(tmp_path, values, 0.3, extra=extra))

@@ -12,12 +12,12 @@ from rich.console import Console
 from noninteract_ros.reporting.rehearsed.compliance import (
     COMPLIANCE,
     NATURAL,
-    Errors,
+    PeakErrors,
     compare_laws,
+    convergence_order,
     critical_damping,
     laws_metrics,
     measure_law,
-    order_of_fall,
 )
 from noninteract_ros.reporting.report.tables import laws_table
 from noninteract_ros.scenario import Scenario
@@ -33,7 +33,7 @@ def scenario() -> Scenario:
 
 
 @pytest.fixture(scope="module")
-def at_1_khz(scenario: Scenario) -> Errors:
+def at_1_khz(scenario: Scenario) -> PeakErrors:
     """The motion under the noninteracting law at 1 kHz."""
     return measure_law(scenario, "noninteracting", 1000.0, DURATION)
 
@@ -108,11 +108,11 @@ def test_all_laws_stand_in_one_table(tmp_path):
 def test_the_order_of_fall_is_that_of_the_errors():
     """Errors that fall to a quarter at twice the rate fall with the square of the tick."""
 
-    def errors(law: str, rate: float, error: float, damping: float = 0.5) -> Errors:
-        return Errors(law, rate, {"a": error}, {"a": 0.0}, 0.0, 0.0, damping, False)
+    def errors(law: str, rate: float, error: float, damping: float = 0.5) -> PeakErrors:
+        return PeakErrors(law, rate, {"a": error}, {"a": 0.0}, 0.0, 0.0, damping, False)
 
     rows = [errors("x", 500.0, 8e-6), errors("x", 1000.0, 2e-6), errors("y", 1000.0, 1.0)]
-    assert order_of_fall(rows, "a") == pytest.approx(2.0)
-    assert order_of_fall(rows[1:], "a") is None
+    assert convergence_order(rows, "a") == pytest.approx(2.0)
+    assert convergence_order(rows[1:], "a") is None
     swinging = errors("x", 250.0, 9.0, damping=2.1)  # Stable from 500 Hz on only.
-    assert order_of_fall([swinging, *rows], "a") == pytest.approx(2.0)
+    assert convergence_order([swinging, *rows], "a") == pytest.approx(2.0)

@@ -20,7 +20,7 @@ from noninteract_ros.nodes.messages.messages import (
 from noninteract_ros.reporting.checks.checks import Check
 from noninteract_ros.reporting.recording.recorded import Recorded
 from noninteract_ros.reporting.recording.writer import RunWriter
-from noninteract_ros.reporting.rehearsed.rehearsals import starts
+from noninteract_ros.reporting.rehearsed.rehearsals import source_starts
 from noninteract_ros.reporting.report.metrics import Findings, measure
 from noninteract_ros.scenario.files import find_scenario, load_scenario
 
@@ -48,7 +48,7 @@ def test_a_sound_run_passes_everything(tmp_path: Path) -> None:
     assert found.metrics["completeness"]["ticks"] == 600
     assert found.metrics["reproduction"]["bit_equal"]
     assert found.metrics["noninteraction"]["without_human"]["moved"]["cooperative"]["m"] > 0.1
-    assert found.metrics["run"]["not_in_the_scenario"] == []
+    assert found.metrics["run"]["external_influences"] == []
 
 
 def test_tracking_is_measured_from_the_first_reference_on(tmp_path: Path) -> None:
@@ -194,7 +194,7 @@ def test_a_reference_that_is_said_again_changes_nothing(tmp_path: Path) -> None:
     topic = "relative/autonomy/reference"
     assert len(run.log_times(topic)) == len(run.trajectory(topic).stamps) + 1
     found = measure(Recorded(run), other_laws=False)
-    assert found.metrics["run"]["not_in_the_scenario"] == []
+    assert found.metrics["run"]["external_influences"] == []
     by_name = checks(found)
     for name in ("closed_form.relative", "reproduction", "noninteraction.autonomy"):
         assert by_name[name].passed
@@ -206,7 +206,7 @@ def test_two_references_for_one_instant_are_another_thing(tmp_path: Path) -> Non
     found = checks(measure(Recorded(run), other_laws=False))
     for name in ("closed_form.relative", "reproduction", "noninteraction.human"):
         assert found[name].passed is None
-        assert "different references for the same instant" in found[name].reason
+        assert "conflicting references with equal stamps" in found[name].reason
 
 
 def test_in_wall_time_only_what_holds_there_is_claimed(tmp_path: Path) -> None:
@@ -227,7 +227,7 @@ def test_in_wall_time_only_what_holds_there_is_claimed(tmp_path: Path) -> None:
     [
         ("running", {"law": "natural"}, "law changed to natural"),
         ("running", {"relative led by": "hold"}, "authority over relative changed to hold"),
-        ("running", {"last start": "robot_1/x jumped by 0.3"}, "started anew: robot_1/x jumped"),
+        ("running", {"last start": "robot_1/x jumped by 0.3"}, "restarted: robot_1/x jumped"),
         ("stopped", {}, "the controller was stopped"),
         ("running", {"changed parameters": "relative.stiffness"}, "changed: relative.stiffness"),
     ],
@@ -242,7 +242,7 @@ def test_changes_at_run_time_are_named(
         writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(said))
 
     run = record(tmp_path, scenario_values(), 0.1, extra=tell)
-    (found,) = measure(Recorded(run), other_laws=False).metrics["run"]["not_in_the_scenario"]
+    (found,) = measure(Recorded(run), other_laws=False).metrics["run"]["external_influences"]
     assert text in found
 
 
@@ -278,9 +278,9 @@ def test_diagnostics_are_summed_up(tmp_path: Path) -> None:
 def test_a_recording_that_cannot_be_analysed_says_why(tmp_path: Path) -> None:
     """No scenario, a wrong scenario, no joint states: one line each."""
     for text, reason in [
-        (None, "holds no scenario"),
-        ("/**: {ros__parameters: {robots: [a]}}", "its scenario is wrong: .*required"),
-        ("rate: [", "its scenario is wrong"),
+        (None, "no scenario"),
+        ("/**: {ros__parameters: {robots: [a]}}", "invalid scenario: .*required"),
+        ("rate: [", "invalid scenario"),
     ]:
         with RunWriter(tmp_path / "run.mcap", text, overwrite=True) as writer:
             data = serialize_message(to_wrench_stamped(0, np.zeros(6)))
@@ -294,4 +294,4 @@ def test_a_recording_that_cannot_be_analysed_says_why(tmp_path: Path) -> None:
 def test_rehearsals_last_until_a_source_has_taken_over() -> None:
     """Where the human leads from a planned hand-over on, what they move shows only then."""
     scenario = load_scenario(find_scenario("hand_over"))
-    assert starts(scenario) == {"human": 2.5, "autonomy": 0.0}
+    assert source_starts(scenario) == {"human": 2.5, "autonomy": 0.0}

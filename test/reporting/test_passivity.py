@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rehearsed import record, scenario_values, told
+from rehearsed import record, scenario_values, tamper_account
 
 from noninteract_ros.reporting.metrics.passivity_observer import (
+    external_work,
     observe,
     passivity_metrics,
-    surroundings_work,
 )
 from noninteract_ros.reporting.metrics.team_account import team_account
 from noninteract_ros.reporting.recording.recorded import Recorded
@@ -85,7 +85,7 @@ def test_lost_states_are_left_out_and_named(arms: Recorded, tmp_path: Path) -> N
 
     seen = observe(Recorded(record(tmp_path, arms_values(), DURATION, lossy)))
     assert seen.gaps == 2
-    assert seen.unseen == pytest.approx(0.051 + 0.002, abs=1e-9)
+    assert seen.gap_time == pytest.approx(0.051 + 0.002, abs=1e-9)
     whole = observe(arms).received
     skipped = (whole[451] - whole[400]) + (whole[701] - whole[699])
     assert seen.received[-1] == pytest.approx(whole[-1] - skipped, abs=1e-12)
@@ -132,7 +132,7 @@ def test_the_controllers_account_says_the_same(arms: Recorded) -> None:
     """Though the push at the elbow, friction and moving references are all in it."""
     metrics, (check,) = passivity_metrics(arms)
     assert check.passed is True
-    received = surroundings_work(observe(arms))[1]
+    received = external_work(observe(arms))[1]
     assert metrics["account"]["disagreement_J"] < 1e-3 * np.abs(received).max()
 
 
@@ -158,7 +158,7 @@ def test_an_account_that_begins_anew_is_compared_piece_by_piece(tmp_path: Path) 
             columns["received"] -= base
             columns["account"] += 1.0
 
-    changed = Recorded(record(tmp_path / "anew", arms_values(), DURATION, told(anew)))
+    changed = Recorded(record(tmp_path / "anew", arms_values(), DURATION, tamper_account(anew)))
     assert abs(base) > 1e-3
     _, (check,) = passivity_metrics(changed)
     assert check.passed is True
@@ -170,10 +170,10 @@ def test_an_account_that_takes_no_notice_of_an_elbow_fails(tmp_path: Path) -> No
     def nothing(columns: dict[str, float]) -> None:
         columns["received"] = 0.0
 
-    run = Recorded(record(tmp_path, arms_values(), DURATION, told(nothing)))
+    run = Recorded(record(tmp_path, arms_values(), DURATION, tamper_account(nothing)))
     metrics, (check,) = passivity_metrics(run)
     assert check.passed is False
-    received = surroundings_work(observe(run))[1]
+    received = external_work(observe(run))[1]
     assert metrics["account"]["disagreement_J"] == pytest.approx(np.abs(received).max(), rel=0.01)
 
 

@@ -24,7 +24,7 @@ DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 KILLED_WRITER = """
 import os, signal, sys
-from noninteract_ros.analysis.recording import RunWriter
+from noninteract_ros.reporting.recording.writer import RunWriter
 
 writer = RunWriter(sys.argv[1], "rate: 1000.0")
 for number in range(20_000):
@@ -34,7 +34,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 FULL_DISK_WRITER = """
 import os, resource, sys
-from noninteract_ros.analysis.recording import RunWriter
+from noninteract_ros.reporting.recording.writer import RunWriter
 from noninteract_ros.errors import RecordingError
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))

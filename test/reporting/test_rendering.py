@@ -11,13 +11,13 @@ from PIL import Image
 from rehearsed import record, scenario_values
 
 from noninteract_ros.reporting.recording.recorded import Recorded
-from noninteract_ros.reporting.rendering.painter import Camera, paint
-from noninteract_ros.reporting.rendering.rendering import (
+from noninteract_ros.reporting.rendering.animation import (
     PUSH_COLOUR,
     Animation,
     motion_figure,
     save_animation,
 )
+from noninteract_ros.reporting.rendering.painter import Camera, paint
 from noninteract_ros.reporting.rendering.scene import Scene
 from noninteract_ros.scenario.files import find_scenario, nest, read_parameters
 from noninteract_ros.scenario.rehearsal import Rehearsal
@@ -77,7 +77,7 @@ def test_collision_geometry_moves_with_the_joints(tmp_path: Path) -> None:
     }
     recorded = Recorded(record(tmp_path, values, 0.01))
     scene = Scene(recorded)
-    parts = [hull for owner, hull in scene.hulls(scene.moment(0).q) if owner == 0]
+    parts = [hull for owner, hull in scene.hulls(scene.snapshot(0).q) if owner == 0]
     # x -> -x and y -> -y by the base; the first joint leans what stands on it along z.
     across, up = -np.sin(0.5), np.cos(0.5)
     expected = ([2.0, 0.0, 0.0], [2.0, -0.5 * across, 0.5 * up], [1.6, -across, up])
@@ -93,7 +93,7 @@ def test_what_is_held_is_drawn_where_the_simulation_had_it(carried: Recorded) ->
     scene = Scene(carried)
     for row in range(400):
         if row % 100 == 0:
-            drawn, true = scene.moment(row).q, rehearsal.simulation.plant_q
+            drawn, true = scene.snapshot(row).q, rehearsal.simulation.plant_q
             np.testing.assert_allclose(drawn[: carried.team.n], true[: carried.team.n], atol=1e-12)
             plates = [
                 next(h for owner, h in scene.hulls(q) if owner == NO_ROBOT) for q in (drawn, true)
@@ -110,7 +110,7 @@ def test_the_ghost_is_on_the_references(carried: Recorded) -> None:
     """All subtasks of the ghost have their desired values, which the team has not when pushed."""
     scene = Scene(carried)
     row = 200
-    ghost = scene.moment(row).ghost
+    ghost = scene.snapshot(row).ghost
     assert ghost is not None
     still = np.zeros((1, carried.team.n))
     wanted = np.hstack(
@@ -126,18 +126,18 @@ def test_the_ghost_is_on_the_references(carried: Recorded) -> None:
 
 def test_a_push_is_an_arrow_while_it_lasts(carried: Recorded) -> None:
     """It ends at the elbow that is pushed, only between 0.2 s and 0.5 s."""
-    film = Animation(carried)
+    animation = Animation(carried)
     counts = []
     for row in (50, 150, 350):
         figure = Figure()
         axes = figure.add_subplot()
-        film.draw(axes, film.scene.moment(row))
+        animation.draw(axes, animation.scene.snapshot(row))
         arrows = [text for text in axes.texts if getattr(text, "arrow_patch", None)]
         counts.append(len(arrows))
         assert all(a.arrow_patch.get_edgecolor()[0] == pytest.approx(0xD0 / 255) for a in arrows)
     assert PUSH_COLOUR == "#D00000"
     assert counts == [0, 1, 0]
-    point, force = film.scene.pushes(film.scene.moment(150))[0]
+    point, force = animation.scene.pushes(animation.scene.snapshot(150))[0]
     data = carried.team.model.createData()
     pin.forwardKinematics(carried.team.model, data, carried.q[150])
     elbow = data.oMi[carried.team.model.getJointId("left/joint_2")].translation
@@ -147,8 +147,8 @@ def test_a_push_is_an_arrow_while_it_lasts(carried: Recorded) -> None:
 
 def test_the_film_strip_shows_six_moments(carried: Recorded) -> None:
     """From the first to the last, with all of the team inside each picture."""
-    film = Animation(carried)
-    figure = motion_figure(film)
+    animation = Animation(carried)
+    figure = motion_figure(animation)
     assert len(figure.axes) == 6
     texts = [text.get_text() for axes in figure.axes for text in axes.texts if text.get_text()]
     times = [float(text.removesuffix(" s")) for text in texts]
@@ -165,25 +165,25 @@ def test_the_animation_is_short_and_small(tmp_path: Path, carried: Recorded) -> 
     """A GIF in real time whose pictures differ."""
     path = save_animation(Animation(carried), tmp_path / "motion.gif")
     assert path.stat().st_size < 2_000_000
-    with Image.open(path) as film:
-        assert film.n_frames == 10
+    with Image.open(path) as animation:
+        assert animation.n_frames == 10
         shown = []
         for number in (0, 9):
-            film.seek(number)
-            shown.append(np.asarray(film.convert("RGB"), dtype=int))
-            assert film.info["duration"] == 100
+            animation.seek(number)
+            shown.append(np.asarray(animation.convert("RGB"), dtype=int))
+            assert animation.info["duration"] == 100
     assert np.abs(shown[0] - shown[1]).max() > 50
 
 
 def test_point_masses_are_balls_with_lines_between(tmp_path: Path) -> None:
     """Heavier ones are larger; a team that moves in a plane is seen from above."""
-    film = Animation(Recorded(record(tmp_path, scenario_values(), 0.3)))
-    light, heavy = (hull for _, hull in film.scene.hulls(film.scene.moment(0).q))
+    animation = Animation(Recorded(record(tmp_path, scenario_values(), 0.3)))
+    light, heavy = (hull for _, hull in animation.scene.hulls(animation.scene.snapshot(0).q))
     sizes = [np.ptp(hull.points, axis=0).max() for hull in (light, heavy)]
     assert sizes[1] / sizes[0] == pytest.approx(2.0 ** (1 / 3), rel=1e-6)
     np.testing.assert_allclose(centre(light), [0.3, 0.4, 0.0], atol=2e-3)
-    assert film.scene.flat
-    assert film.scene.edges == [(0, 1)]
+    assert animation.scene.flat
+    assert animation.scene.edges == [(0, 1)]
 
 
 def test_states_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
@@ -193,9 +193,9 @@ def test_states_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
         broken = topic == "joint_states" and time < 0.1
         return [array * np.nan for array in arrays] if broken else arrays
 
-    film = Animation(Recorded(record(tmp_path, scenario_values(), 0.2, spoil)))
-    assert film.rows(5).min() == 50
-    assert len(motion_figure(film).axes) == 6
+    animation = Animation(Recorded(record(tmp_path, scenario_values(), 0.2, spoil)))
+    assert animation.rows(5).min() == 50
+    assert len(motion_figure(animation).axes) == 6
 
 
 def test_hulls_are_closed_and_look_outward() -> None:

@@ -83,11 +83,11 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (None, "is no run: the folder holds no run.mcap"),
+        (None, "no run.mcap in this folder"),
         (b"", "is empty"),
         (b"hello", "is not an MCAP file"),
         ("cut", "try: noninteract repair"),
-        ("no scenario", "holds no scenario"),
+        ("no scenario", "no scenario: the run cannot be analysed"),
     ],
 )
 def test_what_cannot_be_read_is_one_sentence_and_exit_status_2(

@@ -24,7 +24,7 @@ def type_name(message: Any) -> str:
 
 
 def record(folder: Path, *messages: tuple[str, Any]) -> Run:
-    """Records messages; the n-th is sent at n seconds and received half a second later."""
+    """Record messages; the n-th is sent at n seconds and received half a second later."""
     with RunWriter(folder / "run.mcap", "rate: 1000.0") as writer:
         for number, (topic, message) in enumerate(messages):
             sent = number * 10**9
@@ -259,7 +259,7 @@ def test_wrong_topics_are_named_with_the_right_ones(tmp_path: Path) -> None:
     run = record(tmp_path, *((topic, joints(0, ["a"])) for topic in ("/x/state", "/y/state")))
     with pytest.raises(RecordingError, match=r"/z is not in the recording.*/x/state \| /y/state"):
         run.joints("/z")
-    with pytest.raises(RecordingError, match="state fits several topics"):
+    with pytest.raises(RecordingError, match="state matches several topics"):
         run.joints("state")
     with pytest.raises(RecordingError, match="holds sensor_msgs/msg/JointState, not geometry"):
         run.wrench("x/state")

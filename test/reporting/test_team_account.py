@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rehearsed import record, scenario_values, told
+from rehearsed import record, scenario_values, tamper_account
 
 from noninteract_ros.errors import RecordingError
 from noninteract_ros.reporting.figures.account_figure import account_figure
-from noninteract_ros.reporting.metrics.passivity_observer import observe, surroundings_work
+from noninteract_ros.reporting.metrics.passivity_observer import external_work, observe
 from noninteract_ros.reporting.metrics.team_account import account_metrics, team_account
 from noninteract_ros.reporting.recording.recorded import Recorded
 
@@ -31,7 +31,7 @@ def passed(checks: list[Any]) -> dict[str, bool | None]:
 def test_an_experiment_that_nobody_touches_keeps_both_gates_open(pair: Recorded) -> None:
     """The metrics are those of the columns."""
     metrics, checks = account_metrics(pair)
-    assert passed(checks) == {"residual": True, "sigma": True, "grip": True}
+    assert passed(checks) == {"residual": True, "sigma": True, "nu": True}
     found = team_account(pair)
     assert metrics["sigma_min"] == 1.0
     assert metrics["sigma_below_1_s"] == 0.0
@@ -49,8 +49,10 @@ def test_a_gate_that_closes_is_found_and_timed(tmp_path: Path) -> None:
         if 0.2999 < columns["time"] < 0.3999:
             columns["sigma"] = 0.4
 
-    metrics, checks = account_metrics(Recorded(record(tmp_path, gated(), 0.6, told(closed))))
-    assert passed(checks) == {"residual": True, "sigma": False, "grip": True}
+    metrics, checks = account_metrics(
+        Recorded(record(tmp_path, gated(), 0.6, tamper_account(closed)))
+    )
+    assert passed(checks) == {"residual": True, "sigma": False, "nu": True}
     assert metrics["sigma_min"] == 0.4
     assert metrics["sigma_below_1_s"] == pytest.approx(0.1, abs=1e-9)
 
@@ -62,7 +64,7 @@ def test_energy_from_nowhere_is_no_rounding(tmp_path: Path) -> None:
         def more(columns: dict[str, float], wrong: float = wrong) -> None:
             columns["residual"] = wrong
 
-        _, checks = account_metrics(Recorded(record(tmp_path, gated(), 0.2, told(more))))
+        _, checks = account_metrics(Recorded(record(tmp_path, gated(), 0.2, tamper_account(more))))
         assert passed(checks)["residual"] is False
 
 
@@ -70,7 +72,7 @@ def test_energy_from_nowhere_is_no_rounding(tmp_path: Path) -> None:
 def test_other_laws_have_no_gates_but_an_account(tmp_path: Path, law: str) -> None:
     """It is kept as an observer."""
     metrics, checks = account_metrics(Recorded(record(tmp_path, scenario_values(law=law), 0.3)))
-    assert passed(checks) == {"residual": True, "sigma": None, "grip": None}
+    assert passed(checks) == {"residual": True, "sigma": None, "nu": None}
     assert metrics["sigma_min"] is None
     assert metrics["gated_s"] == 0.0
 
@@ -80,7 +82,7 @@ def test_what_the_team_touches_may_close_a_gate(tmp_path: Path) -> None:
     push = {"robot": "robot_1", "start": 0.1, "duration": 0.1, "force": [9.0, 0.0, 0.0]}
     run = Recorded(record(tmp_path, gated() | {"pushes": ["shove"], "shove": push}, 0.3))
     _, checks = account_metrics(run)
-    assert passed(checks) == {"residual": True, "sigma": None, "grip": None}
+    assert passed(checks) == {"residual": True, "sigma": None, "nu": None}
     assert "shove" in checks[1].reason
 
 
@@ -118,4 +120,4 @@ def test_the_fifth_figure_shows_all_of_the_account(pair: Recorded) -> None:
     low, high = figure.axes[2].get_ylim()
     assert low < 0.0 < 1.0 < high
     observed = figure.axes[3].lines[2]
-    np.testing.assert_array_equal(observed.get_ydata(), surroundings_work(observe(pair))[1])
+    np.testing.assert_array_equal(observed.get_ydata(), external_work(observe(pair))[1])

@@ -10,7 +10,7 @@ import pytest
 
 from noninteract_ros import cli
 from noninteract_ros.validation.benchmarks import bench
-from noninteract_ros.validation.benchmarks.bench import Row, as_dict, take_turns
+from noninteract_ros.validation.benchmarks.bench import Row, as_dict, time_alternately
 
 FIGURES = ("median [us]", "p99 [us]", "per second", "count")
 
@@ -89,7 +89,7 @@ def test_things_take_turns() -> None:
         def run(self) -> None:
             calls.append(self.name)
 
-    times = take_turns({name: Noted(name) for name in "ab"}, 2 * bench.BATCH)
+    times = time_alternately({name: Noted(name) for name in "ab"}, 2 * bench.BATCH)
     assert [len(found) for found in times.values()] == [2 * bench.BATCH] * 2
     runs = [call for call in calls if len(call) == 1]
     assert calls[::2] == [f"prepare {name}" for name in runs]

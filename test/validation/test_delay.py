@@ -8,17 +8,17 @@ import pytest
 
 from noninteract_ros import cli
 from noninteract_ros.reporting.metrics.link_metrics import ROUNDING
+from noninteract_ros.validation import delay
 from noninteract_ros.validation.check import BUILT_IN, CheckSettings
-from noninteract_ros.validation.delay import delay, link_runs
-from noninteract_ros.validation.delay.link_runs import LinkRun, run, scenario
+from noninteract_ros.validation.delay import LinkRun, run, scenario
 
 
 def test_without_passivity_the_loop_is_stable_at_once_and_unstable_with_a_delay() -> None:
     """The same hand and wall: at rest without a delay, shaking at 50 ms, drawing energy."""
     still, shaking = (run(scenario("wall", d, "none"), 3.0) for d in (0.0, 0.05))
-    assert still.restlessness < 0.02
+    assert still.rms_speed < 0.02
     assert still.drawn < 0.01
-    assert shaking.restlessness > 0.2
+    assert shaking.rms_speed > 0.2
     assert shaking.drawn > 5.0
 
 
@@ -26,10 +26,10 @@ def test_without_passivity_the_loop_is_stable_at_once_and_unstable_with_a_delay(
 def test_with_passivity_it_settles_and_no_more_than_the_bound_is_drawn(place: str) -> None:
     """At 200 ms one way with jitter and losses the team gets where it is led."""
     kept = run(scenario(place, 0.2, "tdpa"))
-    assert kept.restlessness < 0.02
-    assert kept.beyond <= ROUNDING
+    assert kept.rms_speed < 0.02
+    assert kept.excess <= ROUNDING
     assert kept.surprise < 1e-3
-    assert kept.behind[-1] < (0.05 if place == "wall" else 0.002)
+    assert kept.offset[-1] < (0.05 if place == "wall" else 0.002)
     force = np.linalg.norm(kept.feedback[-500:].mean(axis=0))  # The tremor is felt, too.
     assert (force > 3.0) if place == "wall" else (force < 0.1)
 
@@ -38,16 +38,16 @@ def test_with_passivity_it_settles_and_no_more_than_the_bound_is_drawn(place: st
 def test_with_waves_it_settles_too(place: str, delay: float) -> None:
     """The other layer that a scenario can choose."""
     kept = run(scenario(place, delay, "waves"))
-    assert kept.restlessness < 0.04
-    assert kept.beyond <= ROUNDING
-    assert kept.behind[-1] < (0.05 if place == "wall" else 0.02)
+    assert kept.rms_speed < 0.04
+    assert kept.excess <= ROUNDING
+    assert kept.offset[-1] < (0.05 if place == "wall" else 0.02)
 
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """One place and one delay."""
     monkeypatch.setattr(delay, "DELAYS", (0.05,))
-    monkeypatch.setattr(link_runs, "PLACES", {"wall": {}})
+    monkeypatch.setattr(delay, "PLACES", {"wall": {}})
 
 
 @pytest.mark.usefixtures("small")
@@ -63,15 +63,15 @@ def test_the_table_has_a_row_and_claims_for_what_is_kept(monkeypatch: pytest.Mon
     assert report.passed
 
 
-def made_up(net: float, budget: float, speed: float, behind: float) -> LinkRun:
+def made_up(net: float, budget: float, speed: float, offset: float) -> LinkRun:
     """A run of which the account, the hand and the team are as they are said to be."""
     t = np.linspace(0.0, 4.0, 41)
     hand, feedback = np.full((41, 2), speed), np.zeros((41, 2))
     net_row, budget_row = np.full(41, net), np.full(41, budget)
-    return LinkRun(t, hand, net_row, budget_row, feedback, np.full(41, behind), 0.1, 0.001)
+    return LinkRun(t, hand, net_row, budget_row, feedback, np.full(41, offset), 0.1, 0.001)
 
 
-GOOD = {"net": -0.1009, "budget": -0.0009, "speed": 0.01, "behind": 0.04}
+GOOD = {"net": -0.1009, "budget": -0.0009, "speed": 0.01, "offset": 0.04}
 
 
 @pytest.mark.usefixtures("small")
@@ -80,10 +80,10 @@ GOOD = {"net": -0.1009, "budget": -0.0009, "speed": 0.01, "behind": 0.04}
     ("wrong", "claim"),
     [
         ({}, ""),
-        ({"net": -0.1011}, "drawn beyond the bound, wall, 50 ms, varying"),
-        ({"budget": -0.0011}, "drawn beyond the bound, wall, 50 ms, varying"),
-        ({"speed": 0.04}, "hand at rest, wall, 50 ms, varying"),
-        ({"behind": 0.06}, "from hand to team, wall, 50 ms, varying"),
+        ({"net": -0.1011}, "energy drawn beyond the bound, wall, 50 ms, varying"),
+        ({"budget": -0.0011}, "energy drawn beyond the bound, wall, 50 ms, varying"),
+        ({"speed": 0.04}, "RMS hand speed, wall, 50 ms, varying"),
+        ({"offset": 0.06}, "offset of hand and team, wall, 50 ms, varying"),
     ],
 )
 def test_one_network_of_several_that_breaks_a_claim_fails_the_check(
@@ -96,13 +96,13 @@ def test_one_network_of_several_that_breaks_a_claim_fails_the_check(
     """The exit code and JSON say so, whichever seed it is."""
 
     def found(changed, duration=0.0):
-        link = link_runs.link_of(changed)
+        link = delay.link_of(changed)
         if link.passivity == "none":
             return made_up(-1.0, np.inf, 1.0, 1.0)
         worse = wrong if (link.seed, link.jitter) == (seed, 0.3) else {}
         return made_up(**GOOD | worse)
 
-    monkeypatch.setattr(link_runs, "run", found)
+    monkeypatch.setattr(delay, "run", found)
     monkeypatch.setattr("sys.argv", ["noninteract", "check", "delay", "--json"])
     code = cli.main()
     told = json.loads(capsys.readouterr().out)
@@ -116,7 +116,7 @@ def test_one_network_of_several_that_breaks_a_claim_fails_the_check(
 @pytest.mark.usefixtures("small")
 def test_a_loop_that_is_stable_without_it_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """The experiment must be able to tell the difference."""
-    monkeypatch.setattr(link_runs, "run", lambda _: made_up(**GOOD))
+    monkeypatch.setattr(delay, "run", lambda _: made_up(**GOOD))
     report = BUILT_IN["delay"](CheckSettings(), ())
     (failed,) = [check for check in report.checks if not check.passed]
-    assert failed.name == "networks in which the loop is unstable without passivity, wall"
+    assert failed.name == "unstable networks without passivity, wall"

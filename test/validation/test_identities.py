@@ -102,7 +102,7 @@ def test_states_are_regular_and_none_is_lost() -> None:
     least = REGULAR * best_regularity(probe.team, probe.stack)
     samples = list(probe.samples(50, seed=1))
     assert len(samples) == 50
-    assert probe.refused > 0
+    assert probe.rejected > 0
     assert min(regularity(sample.dynamics.S) for sample in samples) >= least
     again = arms_probe().samples(50, seed=1)
     assert all((a.state.q == b.state.q).all() for a, b in zip(samples, again, strict=True))
@@ -136,7 +136,7 @@ def test_scenarios_without_their_robots_are_left_out(monkeypatch: pytest.MonkeyP
     """Without the extra the others are measured; asked for by name, it is an error."""
     left = {name: ROOT / "config" / f"{name}.yaml" for name in ("dual_panda", "paper")}
     monkeypatch.setattr(
-        "noninteract_ros.validation.identities.identity_check.known_scenarios", lambda: left
+        "noninteract_ros.validation.identities.identities.known_scenarios", lambda: left
     )
     monkeypatch.setattr(
         "noninteract_ros.team.models.urdf_files.share_folders", lambda: [Path("/none")]

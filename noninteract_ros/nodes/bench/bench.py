@@ -37,7 +37,7 @@ from noninteract_ros.validation.benchmarks.bench import (
     Row,
     Timed,
     bench_scenarios,
-    take_turns,
+    time_alternately,
 )
 from noninteract_ros.validation.benchmarks.law import PinocchioTerms, law_rows
 from noninteract_ros.validation.benchmarks.teams import bench_teams
@@ -131,7 +131,7 @@ def node_rows(name: str, values: Mapping[str, Any], case: BenchCase, count: int)
         controller = ControllerCycle(values, case, Path(folder))
         node, terms = f"controller node, {name}", f"Pinocchio's terms beside the node, {name}"
         timed: dict[str, Timed] = {node: controller, terms: PinocchioTerms(case)}
-        times = take_turns(timed, count)
+        times = time_alternately(timed, count)
         controller.close()
     return [Row("node", node, times[node], terms), Row("node", terms, times[terms])]
 

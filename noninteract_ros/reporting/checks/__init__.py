@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Claims about a run or a scenario, judged against limits."""
+"""Checks of a run or a scenario against limits."""

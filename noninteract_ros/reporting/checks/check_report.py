@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a check found: facts and claims, as tables for a terminal and as a dictionary for JSON."""
+"""Report of facts and checks, as tables for the terminal and as a dictionary for JSON."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,7 +13,13 @@ from noninteract_ros.reporting.checks.checks import Check
 
 @dataclass(frozen=True)
 class Section:
-    """One table of a report: a row per thing, a cell per column."""
+    """One table of a report.
+
+    Attributes:
+        title: Title of the table and key in JSON.
+        columns: Column headers.
+        rows: One cell per column; arrays are shown by their range.
+    """
 
     title: str
     columns: tuple[str, ...]
@@ -22,14 +28,14 @@ class Section:
 
 @dataclass(frozen=True)
 class CheckReport:
-    """What a check found.
+    """Facts, checks and warnings about a target.
 
     Attributes:
-        target: What was checked.
-        sections: Facts, to read.
-        checks: Claims against limits.
-        warnings: What is allowed but hardly meant.
-        brief: Whether tables leave out the claims that hold, as the sections show them.
+        target: Name of the target.
+        sections: Tables of facts.
+        checks: Checks against limits.
+        warnings: Allowed but doubtful settings.
+        brief: True to show only checks that did not pass.
     """
 
     target: str
@@ -40,11 +46,11 @@ class CheckReport:
 
     @property
     def passed(self) -> bool:
-        """Whether no claim fails."""
+        """True if no check failed."""
         return all(check.passed is not False for check in self.checks)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Return the report as a dictionary for JSON."""
         return {
             "target": self.target,
             "passed": self.passed,
@@ -59,10 +65,10 @@ class CheckReport:
         }
 
     def tables(self) -> list[Table]:
-        """For a terminal."""
+        """Return the report as tables for the terminal."""
         tables = [_table(section) for section in self.sections]
         shown = [check for check in self.checks if not (self.brief and check.passed)]
-        return [*tables, _claims(shown)] if shown else tables
+        return [*tables, _checks_table(shown)] if shown else tables
 
 
 def _plain(cell: Any) -> Any:
@@ -74,12 +80,12 @@ def _table(section: Section) -> Table:
     for name, cell in zip(section.columns, section.rows[0], strict=True):
         table.add_column(name, justify="left" if isinstance(cell, (str, tuple)) else "right")
     for row in section.rows:
-        table.add_row(*(_words(cell) for cell in row))
+        table.add_row(*(_format(cell) for cell in row))
     return table
 
 
-def _words(cell: Any) -> str:
-    """A cell in words; of many numbers their range, of many names the first."""
+def _format(cell: Any) -> str:
+    """Format a cell: arrays by their range, long tuples by their first entries."""
     if isinstance(cell, np.ndarray):
         if not cell.size:
             return "-"
@@ -90,14 +96,14 @@ def _words(cell: Any) -> str:
     return f"{cell:.6g}" if isinstance(cell, float) else str(cell)
 
 
-def _claims(checks: Sequence[Check]) -> Table:
+def _checks_table(checks: Sequence[Check]) -> Table:
     table = Table(title="Checks", title_justify="left")
-    for name in ("claim", "found", "limit", ""):
-        table.add_column(name, justify="right" if name in ("found", "limit") else "left")
-    verdicts = {True: "[green]pass[/]", False: "[bold red]FAIL[/]", None: "does not apply"}
+    for name in ("check", "value", "limit", ""):
+        table.add_column(name, justify="right" if name in ("value", "limit") else "left")
+    results = {True: "[green]passed[/]", False: "[bold red]FAILED[/]", None: "n/a"}
     for check in checks:
         bound = ">=" if check.at_least else "<="
-        found = "-" if check.value is None else f"{check.value:.6g}"
+        value = "-" if check.value is None else f"{check.value:.6g}"
         limit = f"{bound} {check.limit:.6g} {check.unit}".strip()
-        table.add_row(check.name, found, limit, verdicts[check.passed])
+        table.add_row(check.name, value, limit, results[check.passed])
     return table

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run must show: values against limits, or the reason why a claim does not apply."""
+"""Checks: a value against a limit, or the reason why the check does not apply."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -7,16 +7,16 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Check:
-    """One claim about a run.
+    """Comparison of a value with a limit.
 
     Attributes:
-        name: What is claimed, e.g. `closed_form.relative`.
-        value: What was found; None where the claim does not apply.
-        limit: The bound.
-        unit: Unit of both.
-        passed: Whether the claim holds; None where it does not apply.
-        reason: Why it does not apply, or an empty text.
-        at_least: Whether the limit is a lower bound.
+        name: Name of the check, e.g. `closed_form.relative`.
+        value: Measured value; None if the check does not apply.
+        limit: Limit of the value.
+        unit: Unit of value and limit.
+        passed: True if the value keeps the limit; None if the check does not apply.
+        reason: Reason why the check does not apply; empty if it does.
+        at_least: True if the limit is a lower bound.
     """
 
     name: str
@@ -28,7 +28,7 @@ class Check:
     at_least: bool = False
 
     def as_dict(self) -> dict[str, Any]:
-        """As it stands in `metrics.json`."""
+        """Return the entry of `metrics.json`."""
         return {
             "name": self.name,
             "value": self.value,
@@ -41,15 +41,24 @@ class Check:
 
 
 def at_most(name: str, value: float, limit: float, unit: str) -> Check:
-    """A value that must not exceed a limit; one that is no number fails."""
-    return Check(name, float(value), limit, unit, bool(value <= limit))
+    """Check that a value does not exceed a limit; NaN fails."""
+    return Check(
+        name=name, value=float(value), limit=limit, unit=unit, passed=bool(value <= limit)
+    )
 
 
 def at_least(name: str, value: float, limit: float, unit: str) -> Check:
-    """A value that must not fall below a limit; one that is no number fails."""
-    return Check(name, float(value), limit, unit, bool(value >= limit), at_least=True)
+    """Check that a value does not fall below a limit; NaN fails."""
+    return Check(
+        name=name,
+        value=float(value),
+        limit=limit,
+        unit=unit,
+        passed=bool(value >= limit),
+        at_least=True,
+    )
 
 
 def not_applicable(name: str, limit: float, unit: str, reason: str) -> Check:
-    """A claim that this run can neither confirm nor refute."""
-    return Check(name, None, limit, unit, None, reason)
+    """Return a check that this run can neither pass nor fail."""
+    return Check(name=name, value=None, limit=limit, unit=unit, passed=None, reason=reason)

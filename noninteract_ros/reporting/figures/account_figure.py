@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The energy account of the port where the team is touched, drawn."""
+"""Figure of the team's energy account at its external port."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -7,17 +7,17 @@ from matplotlib.figure import Figure
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.reporting.figures.marks import mark_transitions
-from noninteract_ros.reporting.metrics.passivity_observer import observe, surroundings_work
+from noninteract_ros.reporting.metrics.passivity_observer import external_work, observe
 from noninteract_ros.reporting.metrics.team_account import TeamAccount, team_account
 from noninteract_ros.reporting.recording.recorded import Recorded
 from noninteract_ros.reporting.rendering.style import COLOURS, new_figure, styled
 
-ROOM = 0.05  # above and below the gates
+MARGIN = 0.05  # above and below the gates
 
 
 @styled
 def account_figure(recorded: Recorded) -> Figure:
-    """Energies, powers, the two gates, and what came in against what is still there.
+    """Draw energies, powers, gates, and received energy with its residual.
 
     Raises:
         RecordingError: The recording lacks the account.
@@ -27,15 +27,15 @@ def account_figure(recorded: Recorded) -> Figure:
     _draw(energies, found.t, ("storage $T+\\nu U$", found.storage), ("tank $E$", found.tank))
     _draw(energies, found.t, ("reserve $R$", found.reserve), first=2)
     _draw(powers, found.t, ("supplied", found.supplied), ("dissipated", found.dissipated))
-    _draw(powers, found.t, ("wanted by decoupling $P$", found.demand), first=2)
-    # Under a law without gates there is nothing to show.
+    _draw(powers, found.t, ("decoupling demand $P$", found.demand), first=2)
+    # Laws without gates have no curves.
     sigma, grip = (np.where(found.gated, gate, np.nan) for gate in (found.sigma, found.grip))
-    _draw(gates, found.t, ("$\\sigma$, of decoupling", sigma), ("$\\nu$, of impedance", grip))
-    gates.lines[1].set_linestyle((0, (4, 3)))  # They often lie on each other.
-    gates.set_ylim(-ROOM, 1.0 + ROOM)
-    _draw(sums, found.t, ("received", _whole(found)), ("residual", found.residual))
-    seen = surroundings_work(observe(recorded))
-    sums.plot(*seen, color="black", linestyle=(0, (1, 2)), label="received, as observed")
+    _draw(gates, found.t, ("decoupling $\\sigma$", sigma), ("impedance $\\nu$", grip))
+    gates.lines[1].set_linestyle((0, (4, 3)))  # The curves often coincide.
+    gates.set_ylim(-MARGIN, 1.0 + MARGIN)
+    _draw(sums, found.t, ("received", _cumulative(found)), ("residual", found.residual))
+    observed = external_work(observe(recorded))
+    sums.plot(*observed, color="black", linestyle=(0, (1, 2)), label="received (observer)")
     if not found.gated.any():
         note = f"law {recorded.scenario.general.law} has no gates"
         gates.text(0.5, 0.5, note, transform=gates.transAxes, ha="center", va="center")
@@ -56,8 +56,8 @@ def _draw(axes: Axes, t: Array, *curves: tuple[str, Array], first: int = 0) -> N
         axes.plot(t, values, color=COLOURS[number], label=label)
 
 
-def _whole(found: TeamAccount) -> Array:
-    """What was received, across the starts of new accounts, shape (n,) [J]."""
+def _cumulative(found: TeamAccount) -> Array:
+    """Return the received energy across resets of the account, shape (n,) [J]."""
     steps = np.diff(found.received, prepend=0.0)
-    anew = np.diff(found.account, prepend=found.account[0]) != 0.0
-    return np.asarray(np.cumsum(np.where(anew, found.received, steps)))
+    reset = np.diff(found.account, prepend=found.account[0]) != 0.0
+    return np.asarray(np.cumsum(np.where(reset, found.received, steps)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The figures of the paper's Section V, drawn from a recording, and the team's paths."""
+"""Tracking and storage figures of the paper's Section V, and the set of all figures."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -16,25 +16,25 @@ from noninteract_ros.reporting.figures.link_figure import link_figure
 from noninteract_ros.reporting.figures.marks import mark_leaders, mark_transitions, transitions
 from noninteract_ros.reporting.figures.paths import paths_figure
 from noninteract_ros.reporting.metrics.link_metrics import link_account
-from noninteract_ros.reporting.metrics.storage_functions import StorageBalance, account
+from noninteract_ros.reporting.metrics.storage_functions import StorageBalance, storage_balance
 from noninteract_ros.reporting.recording.recorded import Recorded, Tracking, select
-from noninteract_ros.reporting.rendering.rendering import Animation, motion_figure, save_animation
+from noninteract_ros.reporting.rendering.animation import Animation, motion_figure, save_animation
 from noninteract_ros.reporting.rendering.style import COLOURS, DASHES, new_figure, save, styled
 from noninteract_ros.subtasks.subtask import Subtask
 
-FEW = 3  # elements that can be told apart in one figure by colour
-LEGEND_WIDTH = 80  # letters in a line of a legend; a line's sample takes six
+FEW = 3  # largest number of elements with a colour each
+LEGEND_WIDTH = 80  # characters in a row of a legend; a line sample takes six
 
 
 def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
-    """Draws all figures that a run has data for.
+    """Draw all figures for which a run has data.
 
     Args:
         recorded: The run.
-        folder: Where the files go; it exists.
+        folder: Existing output folder.
 
     Returns:
-        The files, and why the others are missing.
+        The files, and the reason for each missing figure.
     """
     files, missing = [], []
     for number, name in enumerate(recorded.stack.names):
@@ -59,9 +59,9 @@ def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
     if not recorded.constant:
         files.append(save(limits_figure(recorded), folder / "limits.png"))
     try:
-        film = Animation(recorded)
-        files.append(save(motion_figure(film), folder / "motion.png"))
-        files.append(save_animation(film, folder / "motion.gif"))
+        animation = Animation(recorded)
+        files.append(save(motion_figure(animation), folder / "motion.png"))
+        files.append(save_animation(animation, folder / "motion.gif"))
     except RecordingError as error:
         missing.append(str(error))
     return files, missing
@@ -69,7 +69,7 @@ def draw(recorded: Recorded, folder: Path) -> tuple[list[Path], list[str]]:
 
 @styled
 def tracking_figure(recorded: Recorded, subtask: str) -> Figure:
-    """Desired (dashed) and actual (solid) coordinates over time, an axis of the world a row.
+    """Draw desired (dashed) and actual (solid) coordinates over time, one row per world axis.
 
     Raises:
         RecordingError: The recording lacks the subtask's state or desired value.
@@ -95,16 +95,16 @@ def tracking_figure(recorded: Recorded, subtask: str) -> Figure:
     mark_leaders(recorded, subtask, rows)
     rows[-1].set_xlabel("time [s]")
     figure.align_ylabels(rows)
-    # Beside the curves there is no telling where room is; above the axes there always is.
+    # A legend above the axes never covers a curve.
     handles, labels = rows[0].get_legend_handles_labels()
     columns = min(len(labels), max(2, LEGEND_WIDTH // (6 + max(map(len, labels)))))
-    columns -= columns % 2 if len(labels) > columns else 0  # Pairs stay one above the other.
+    columns -= columns % 2 if len(labels) > columns else 0  # Keep pairs in one column.
     figure.legend(handles, labels, loc="outside upper right", ncols=columns)
     return figure
 
 
 def _draw_angles(axes: Axes, tracking: Tracking, task: Subtask) -> None:
-    """Angle between actual and desired rotation of each element."""
+    """Draw the angle between actual and desired rotation of each element."""
     e = task.layout.difference(tracking.actual.position, tracking.desired.position)
     angles = np.linalg.norm(e[:, task.layout.angular], axis=2)
     lines = axes.plot(tracking.t, angles, color=COLOURS[1], linewidth=1.0)
@@ -114,23 +114,23 @@ def _draw_angles(axes: Axes, tracking: Tracking, task: Subtask) -> None:
 
 
 def _quantity(subtask: str, elements: tuple[str, ...]) -> str:
-    """What an axis shows: a distance between robots, or a position of the subtask."""
+    """Return the axis label: a distance between robots, or the name of the subtask."""
     return "distance" if all("-" in element for element in elements) else subtask
 
 
 def _draw_few(
     axes: Axes, tracking: Tracking, actual: Array, desired: Array, elements: tuple[str, ...]
 ) -> None:
-    """A colour for each element."""
+    """Draw each element in its own colour."""
     for number, element in enumerate(elements):
         of = f" {element}" if len(elements) > 1 else ""
         colour = COLOURS[number]
         axes.plot(tracking.t, actual[:, number], color=colour, label=f"actual{of}")
-        wanted = "black" if len(elements) == 1 else colour
+        desired_colour = "black" if len(elements) == 1 else colour
         axes.plot(
             tracking.t,
             desired[:, number],
-            color=wanted,
+            color=desired_colour,
             linestyle=(0, (5, 2.5)),
             linewidth=1.1,
             label=f"desired{of}",
@@ -140,7 +140,7 @@ def _draw_few(
 def _draw_many(
     axes: Axes, tracking: Tracking, actual: Array, desired: Array, elements: tuple[str, ...]
 ) -> None:
-    """All elements alike; what matters is how they lie on what is desired."""
+    """Draw all elements in the same style."""
     count = len(elements)
     solid = axes.plot(tracking.t, actual, color=COLOURS[0], linewidth=0.6, alpha=0.7)
     dashed = axes.plot(
@@ -152,18 +152,18 @@ def _draw_many(
 
 @styled
 def storage_figure(recorded: Recorded) -> Figure:
-    """Storage functions (up) and their rates (down), each from its subtask's start on.
+    """Draw storage functions (top) and their rates (bottom), each from its subtask's start on.
 
-    In a run that somebody stopped or changed in between they are shown over the run's own time.
+    Runs with stops or transitions are drawn over the time of the run.
 
     Raises:
         RecordingError: The recording lacks an energy.
     """
-    names, led_by_hand = recorded.stack.names, bool(transitions(recorded))
+    names, interrupted = recorded.stack.names, bool(transitions(recorded))
     figure, (storages, rates) = new_figure(4.2, 2)
     for number, name in enumerate(names):
         t, found = _aligned(recorded, name)
-        t = found.t if led_by_hand else t
+        t = found.t if interrupted else t
         for axes, values, symbol in (
             (storages, found.storage, "S"),
             (rates, found.rate, r"\dot{S}"),
@@ -173,36 +173,36 @@ def storage_figure(recorded: Recorded) -> Figure:
                 values,
                 color=COLOURS[number % len(COLOURS)],
                 linestyle=DASHES[number % len(DASHES)],
-                label=_letter(symbol, name, names),
+                label=_symbol_label(symbol, name, names),
             )
     storages.set_ylabel("storage [J]")
     rates.set_ylabel("rate of storage [W]")
     figure.align_ylabels([storages, rates])
-    rates.set_xlabel("time [s]" if led_by_hand else "time since the subtask's start [s]")
+    rates.set_xlabel("time [s]" if interrupted else "time since the subtask's start [s]")
     for axes in (storages, rates):
         axes.axhline(0.0, color="black", linewidth=0.6, zorder=1)
     mark_transitions(recorded, (storages, rates))
     handles, labels = storages.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=3)
-    storages.set_xlim(0.0, recorded.t[-1] if led_by_hand else _shown(recorded))
+    storages.set_xlim(0.0, recorded.t[-1] if interrupted else _settling_time(recorded))
     return figure
 
 
 def _aligned(recorded: Recorded, subtask: str) -> tuple[Array, StorageBalance]:
-    """An account from its subtask's start on, its time counted from there."""
-    found = account(recorded, subtask)
+    """Return time since the subtask's start and the balance from there on."""
+    found = storage_balance(recorded, subtask)
     start = recorded.start(subtask)
     since = found.t - (found.t[0] if start is None else start)
     rows = since >= -1e-9
     columns = ("t", "storage", "rate", "supplied", "velocity_error")
-    told = {name: getattr(found, name)[rows] for name in columns}
-    return since[rows], replace(found, desired=select(found.desired, rows), **told)
+    selected = {name: getattr(found, name)[rows] for name in columns}
+    return since[rows], replace(found, desired=select(found.desired, rows), **selected)
 
 
-def _shown(recorded: Recorded) -> float:
-    """Time until every storage function has settled, with as much again to see it [s].
+def _settling_time(recorded: Recorded) -> float:
+    """Return twice the time until every storage function has settled [s].
 
-    All of the time, where one does not settle.
+    The whole duration if one does not settle.
     """
     settled = []
     for name in recorded.stack.names:
@@ -218,8 +218,8 @@ def _shown(recorded: Recorded) -> float:
     return float(np.clip(2.0 * max(settled), min(1.0, longest), longest)) or 1.0
 
 
-def _letter(symbol: str, name: str, names: tuple[str, ...]) -> str:
-    """The paper's letter of a subtask, S_c or S_r; its name where initials clash."""
+def _symbol_label(symbol: str, name: str, names: tuple[str, ...]) -> str:
+    """Return the symbol of a subtask, such as S_c or S_r, or its name if initials coincide."""
     initials = [other[0] for other in names]
     index = name[0] if initials.count(name[0]) == 1 else name.replace("_", r"\_")
     letter = f"${symbol}_{{{index}}}$" if len(index) == 1 else f"${symbol}$ {name}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The energy account of a link between an operator's device and the team, drawn."""
+"""Figure of the energy account of the link between operator device and team."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,20 +15,20 @@ PORTS = (("operator", "hand"), ("team", "team"))
 
 @styled
 def link_figure(recorded: Recorded, account: LabelledSeries) -> Figure:
-    """What passed either port, the operator's balance above its bound, and the ends' budgets."""
+    """Draw energies at both ports, the operator's balance with its bound, and budgets."""
     link = recorded.scenario.link
     t = recorded.since_start(account.stamps)
     figure, (ports, balance, budgets) = new_figure(5.6, 3)
     for colour, (port, name) in zip(COLOURS, PORTS, strict=False):
         ports.plot(t, account[f"{port}_in"], color=colour, label=f"{name}: in")
         ports.plot(t, account[f"{port}_out"], color=colour, linestyle="--", label=f"{name}: out")
-    balance.plot(t, operator_net(account), color=COLOURS[0], label="put in by the operator, net")
+    balance.plot(t, operator_net(account), color=COLOURS[0], label="operator net input")
     if link and link.passivity != "none":
         bound = -link.reserve - account["surprise"]
         balance.plot(t, bound, color=COLOURS[1], linestyle="--", label="bound")
     for colour, (end, name) in zip(COLOURS, (("device", "device"), PORTS[1]), strict=False):
         level = account[f"{end}_budget"]
-        # Without observers there is no end to what may be spent.
+        # Without passivity observers budgets are infinite.
         budgets.plot(t, np.where(np.isfinite(level), level, np.nan), color=colour, label=name)
     _finish(ports, "energy [J]")
     _finish(balance, "balance [J]")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a reader of a figure over time should know: who led, and when the law was not alone."""
+"""Marks of authority and of transitions in figures over time."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -8,25 +8,25 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from noninteract_ros.control.references.subtask_input import AUTHORITIES
-from noninteract_ros.reporting.metrics.intervals import pieces
+from noninteract_ros.reporting.metrics.intervals import segments
 from noninteract_ros.reporting.recording.recorded import Recorded
 
-LETTER = 0.013  # share of a figure's width that a letter takes
-LABEL = "stop or change"
+LETTER = 0.013  # width of a letter relative to the figure's
+LABEL = "stop or transition"
 GREY = "0.9"
 
 
 def transitions(recorded: Recorded) -> list[tuple[float, float]]:
-    """Times [s] in which a change of law or gains faded in, a stop or a new start had a part."""
-    told = recorded.told(recorded.stack.names[0], "transitions")
-    if told is None:
+    """Return start and end [s] of each transition of law or gains, stop or restart."""
+    entry = recorded.energy_entry(recorded.stack.names[0], "transitions")
+    if entry is None:
         return []
-    t, counts = told
-    return [(t[first], t[last]) for first, last in pieces(np.diff(counts) > 0.0)]
+    t, counts = entry
+    return [(t[first], t[last]) for first, last in segments(np.diff(counts) > 0.0)]
 
 
 def mark_transitions(recorded: Recorded, rows: Sequence[Axes]) -> None:
-    """Shades them; only the first one in the first row has a label."""
+    """Shade transitions; the first one in the first row has a label."""
     for number, (first, last) in enumerate(transitions(recorded)):
         for row, axes in enumerate(rows):
             label = None if number or row else LABEL
@@ -34,14 +34,14 @@ def mark_transitions(recorded: Recorded, rows: Sequence[Axes]) -> None:
 
 
 def mark_leaders(recorded: Recorded, subtask: str, rows: Sequence[Axes]) -> None:
-    """Dotted lines where somebody else begins to lead, and who, if there are several who do.
+    """Draw dotted lines at changes of authority, with the name of the leading source.
 
-    A while that is too short for a word has none.
+    Short intervals have no name; runs with one source have no marks.
     """
-    told = recorded.told(subtask, "leader")
-    if told is None or not len(told[0]):
+    entry = recorded.energy_entry(subtask, "leader")
+    if entry is None or not len(entry[0]):
         return
-    t, leader = told
+    t, leader = entry
     sources = [AUTHORITIES.index(name) for name in AUTHORITIES if name != "hold"]
     if len(set(leader.astype(int).tolist()) & set(sources)) < 2:
         return
@@ -50,10 +50,10 @@ def mark_leaders(recorded: Recorded, subtask: str, rows: Sequence[Axes]) -> None
         if first:
             for axes in rows:
                 axes.axvline(t[first], color="0.4", linewidth=0.7, linestyle=":", zorder=1)
-        word = AUTHORITIES[int(leader[first])]
-        if t[last] - t[first] >= LETTER * len(word) * (t[-1] - t[0]):
+        name = AUTHORITIES[int(leader[first])]
+        if t[last] - t[first] >= LETTER * len(name) * (t[-1] - t[0]):
             rows[0].annotate(
-                word,
+                name,
                 (t[first], 1.0),
                 xycoords=("data", "axes fraction"),
                 xytext=(2, 2),

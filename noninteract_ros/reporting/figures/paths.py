@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The team seen from above: paths of the tool points and formations along them."""
+"""Figure of tool paths and formations in the plane."""
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,15 +12,15 @@ from noninteract_ros.reporting.rendering.style import COLOURS, WIDTH, new_figure
 from noninteract_ros.reporting.rendering.tool_points import edges_of, tool_points
 from noninteract_ros.team.robot import AXES
 
-FORMATIONS = 9  # of a small team; a large one covers itself
+FORMATIONS = 9  # of a small team
 FORMATIONS_OF_MANY = 4
-APART = 0.07  # share of the width by which the times of formations stand apart
-FEW = 6  # robots that get a colour and a name each
+APART = 0.07  # smallest distance of time labels relative to the width
+FEW = 6  # largest number of robots with a colour and a name each
 
 
 @styled
 def paths_figure(recorded: Recorded) -> Figure:
-    """Paths in the plane of the team's first two axes; a team on one axis over time."""
+    """Draw paths in the plane of the team's first two axes; over time for a single axis."""
     t, points = tool_points(recorded)
     used = [axis for axis in AXES if any(axis in robot.axes for robot in recorded.team.robots)]
     if len(used) > 1:
@@ -57,7 +57,7 @@ def _draw_paths(axes: Axes, recorded: Recorded, plan: Array) -> None:
 
 
 def _draw_formations(axes: Axes, recorded: Recorded, t: Array, plan: Array) -> None:
-    """Robots as dots, joined along the edges of the subtasks, from light to dark over time."""
+    """Draw robots as dots joined by subtask edges, from light to dark over time."""
     few = len(recorded.team.names) <= FEW
     times = MaxNLocator(FORMATIONS if few else FORMATIONS_OF_MANY).tick_values(t[0], t[-1])
     times = times[(times >= t[0]) & (times <= t[-1])]
@@ -68,7 +68,7 @@ def _draw_formations(axes: Axes, recorded: Recorded, t: Array, plan: Array) -> N
         shade = f"{0.7 * (1.0 - step / max(1, len(times) - 1)):.3f}"
         for first, second in edges:
             axes.plot(*plan[row, [first, second]].T, color=shade, linewidth=0.9, zorder=3)
-        # Many robots have no room for words between them.
+        # Large teams have no room for text between robots.
         label = None if few else f"{time:g} s"
         size = 4.5 if few else 2.5
         axes.plot(*plan[row].T, "o", color=shade, markersize=size, zorder=4, label=label)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The decoupled closed loop (29) of each subtask, integrated on its own, against the recording.
+"""Closed-form dynamics (29) of each decoupled subtask, compared with the recording.
 
 For point masses M_i is constant and C~_i zero: M_i e'' + D_i e' + h_i(e) = tau~_i, where tau~_i is
-what the scenario's object and pushes exert. A run that deviates by more than holding the torque
-over a tick explains was not led by this law.
+the force of the scenario's object and pushes. A run that deviates by more than the effect of the
+zero-order hold did not follow this law.
 """
 
 from collections.abc import Iterator
@@ -19,26 +19,26 @@ from noninteract_ros.control.law.impedance import stack_impedance
 from noninteract_ros.reporting.checks.checks import Check, at_most, not_applicable
 from noninteract_ros.reporting.metrics import intervals
 from noninteract_ros.reporting.metrics.influences import CHANGE, MOTION, Influence
-from noninteract_ros.reporting.metrics.storage_functions import account
+from noninteract_ros.reporting.metrics.storage_functions import storage_balance
 from noninteract_ros.reporting.recording.recorded import FRICTION, Recorded, RecordedMotion, select
 from noninteract_ros.simulation.subtask_object import SIGNS
 from noninteract_ros.team.team import TeamState
 
-# [m] at 1 kHz for errors up to 1 m: holding the torque over a tick is of first order in the tick,
-# and the equations are linear (a saturating potential only weakens them).
+# [m] at 1 kHz for errors up to 1 m: the effect of the zero-order hold is of first order in the
+# tick, and the equations are linear (a saturating potential only weakens them).
 LIMIT = 2e-3
 RTOL, ATOL = 1e-10, 1e-12
-SPACING = 0.005  # [s] closer references make a quintic noisy with rounding
+SPACING = 0.005  # [s] smallest spacing of references at which rounding spoils no quintic
 
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """What (29) predicts for one subtask while it is led.
+    """Prediction of (29) for one subtask while it is led.
 
     Attributes:
-        start: When it was first led [s].
+        start: Time at which it is first led [s].
         inertia: M_i, shape (p, p) [kg].
-        t: Times of the states that were compared, shape (n,) [s].
+        t: Times of the compared states, shape (n,) [s].
         deviation: Recorded minus predicted, shape (n, p) [m].
         largest_error: Largest predicted error of a coordinate [m].
     """
@@ -51,14 +51,14 @@ class ClosedForm:
 
 
 class NotApplicableError(Exception):
-    """The closed form says nothing about this run; the text says why."""
+    """The closed form does not apply to this run; the message gives the reason."""
 
 
 class DesiredPath:
-    """The motion between instants: the quintic that fits position, velocity, acceleration.
+    """Piecewise quintic through position, velocity and acceleration.
 
     Args:
-        motion: At least two instants.
+        motion: At least two points.
     """
 
     def __init__(self, motion: RecordedMotion) -> None:
@@ -80,7 +80,7 @@ class DesiredPath:
         )
 
     def __call__(self, t: Array | float) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration at t, shape (..., p) each."""
+        """Return position, velocity and acceleration at t, shape (..., p) each."""
         row = np.clip(np.searchsorted(self._t, t, side="right") - 1, 0, len(self._t) - 2)
         s = np.asarray(t - self._t[row])[..., None]
         c0, c1, c2, c3, c4, c5 = self._coefficients[:, row]
@@ -92,7 +92,7 @@ class DesiredPath:
 
 
 class ErrorDynamics:
-    """(29) of one subtask of a team of point masses.
+    """Error dynamics (29) of one subtask of a team of point masses.
 
     Args:
         recorded: Scenario and team.
@@ -107,7 +107,7 @@ class ErrorDynamics:
         self._state = self._team.state(self._team.q0, np.zeros(self._team.n))
         dynamics = _dynamics(recorded, self._state)
         self.inertia = dynamics.inertias[recorded.stack.names.index(subtask)]
-        # An object at subtask level acts through the team's own inertia, whatever M_i is asked.
+        # An object at subtask level acts through the natural inertia, whatever the desired M_i.
         self._compliance = np.linalg.inv(dynamics.inertia[self._part, self._part])
         self._of_push = dynamics.J[self._part] @ np.linalg.inv(dynamics.M)
         held = recorded.scenario.held
@@ -118,23 +118,23 @@ class ErrorDynamics:
         self._mass = sign * held.mass if held and carries else 0.0
         self._stiffness = sign * held.stiffness if held and grasps else 0.0
         self._rest = np.array(held.rest) if held and self._stiffness else 0.0
-        # (1 - m M_i^-1) x'' = everything else: the object's mass feels the acceleration.
+        # (1 - m M_i^-1) x'' = all other terms: the object's mass acts on the acceleration.
         self._share = np.linalg.inv(np.eye(len(self.inertia)) - self._mass * self._compliance)
 
     def push(self, t: float) -> Array:
-        """Acceleration that the scenario's pushes give at a tick, shape (p,) [m/s^2]."""
+        """Return the acceleration due to scheduled pushes at a tick, shape (p,) [m/s^2]."""
         wrenches = np.zeros((len(self._team.names), 6))
         for push in self._pushes:
             wrenches[self._team.index(push.robot)] += push.wrench(t)
         return self._of_push @ self._team.external_torque(self._state, wrenches)
 
     def solve(self, path: DesiredPath, t: Array, x: Array, x_rate: Array) -> Array:
-        """Errors at times t, from x and x_rate at the first of them, shape (n, p)."""
+        """Integrate the errors over times t from x and x_rate at t[0], shape (n, p)."""
         desired, desired_rate, _ = path(t[0])
         state = np.concatenate((x - desired, x_rate - desired_rate))
         pushes = np.array([self.push(now) for now in t])
         changes = np.flatnonzero((pushes[1:] != pushes[:-1]).any(axis=1)) + 1
-        pieces = []
+        segments = []
         for first, last in pairwise([0, *changes.tolist(), len(t) - 1]):
             solution = solve_ivp(
                 lambda now, y, push=pushes[first]: self._rates(path, now, y, push),
@@ -146,8 +146,8 @@ class ErrorDynamics:
                 atol=ATOL,
             )
             state = solution.y[:, -1]
-            pieces.append(solution.y.T[: last - first])
-        return np.concatenate([*pieces, state[None]])[:, : len(x)]
+            segments.append(solution.y.T[: last - first])
+        return np.concatenate([*segments, state[None]])[:, : len(x)]
 
     def _rates(self, path: DesiredPath, t: float, y: Array, push: Array) -> Array:
         e, e_rate = np.split(y, 2)
@@ -168,13 +168,13 @@ def _dynamics(recorded: Recorded, state: TeamState) -> TaskDynamics:
     return task_dynamics(state, recorded.stack.evaluate(state), recorded.stack.slices, inertias)
 
 
-def closed_form(recorded: Recorded, subtask: str, outside: list[Influence]) -> ClosedForm:
-    """Compares one subtask with its closed form wherever it is led without a break.
+def closed_form(recorded: Recorded, subtask: str, external: list[Influence]) -> ClosedForm:
+    """Compare one subtask with its closed form wherever it is led without interruption.
 
     Raises:
-        NotApplicableError: The closed form says nothing about this run.
+        NotApplicableError: The closed form does not apply to this run.
     """
-    _require(recorded, subtask, outside)
+    _require(recorded, subtask, external)
     dynamics = ErrorDynamics(recorded, subtask)
     x, x_rate = (values[:, recorded.part(subtask)] for values in recorded.values)
     times, deviations, largest = [], [], 0.0
@@ -189,18 +189,18 @@ def closed_form(recorded: Recorded, subtask: str, outside: list[Influence]) -> C
         deviations.append(x[first:last] - path(t)[0] - errors)
         largest = max(largest, float(np.abs(errors).max()))
     if not times:
-        raise NotApplicableError("nothing leads it for two references in a row")
+        raise NotApplicableError("no two consecutive references")
     return ClosedForm(
-        float(times[0][0]),
-        dynamics.inertia,
-        np.concatenate(times),
-        np.concatenate(deviations),
-        largest,
+        start=float(times[0][0]),
+        inertia=dynamics.inertia,
+        t=np.concatenate(times),
+        deviation=np.concatenate(deviations),
+        largest_error=largest,
     )
 
 
 def closed_form_check(recorded: Recorded, subtask: str, found: ClosedForm | str) -> Check:
-    """Largest deviation against the bound, or why there is none."""
+    """Return the check of the largest deviation, or of the reason why it does not apply."""
     name, limit = f"closed_form.{subtask}", LIMIT * 1000.0 / recorded.rate
     unit = ", ".join(sorted(set(recorded.task(subtask).units)))
     if isinstance(found, str):
@@ -209,12 +209,12 @@ def closed_form_check(recorded: Recorded, subtask: str, found: ClosedForm | str)
     return at_most(name, float(np.abs(found.deviation).max()), limit, unit)
 
 
-def _require(recorded: Recorded, subtask: str, outside: list[Influence]) -> None:
+def _require(recorded: Recorded, subtask: str, external: list[Influence]) -> None:
     scenario, law = recorded.scenario, recorded.scenario.general.law
     shaped = scenario.subtasks[subtask].input.takeover == "shaped"
-    # A motion that is shaped is known as it was told, and changes are left out while they last.
+    # Shaped motions are known from the desired motion; transitions are excluded.
     known = (MOTION, CHANGE) if shaped else ()
-    concerned = [item for item in outside if item.subtask in ("", subtask)]
+    concerned = [item for item in external if item.subtask in ("", subtask)]
     foreign = [item.text for item in concerned if item.kind not in known]
     on_tools = all(push.on_tool(recorded.team) for push in scenario.pushes.values())
     changed = recorded.interventions()
@@ -222,11 +222,11 @@ def _require(recorded: Recorded, subtask: str, outside: list[Influence]) -> None
         f"law {law} does not decouple": law not in DECOUPLING_LAWS,
         "the team's inertia is not constant": not recorded.constant,
         "wall time: ticks are not evenly spaced": not recorded.lockstep,
-        f"the team touches {', '.join(scenario.surroundings)}": bool(scenario.surroundings),
-        "a push acts elsewhere than on a tool": not on_tools,
+        f"contact with {', '.join(scenario.surroundings)}": bool(scenario.surroundings),
+        "a push acts on a link, not on a tool": not on_tools,
         FRICTION: recorded.team.friction.any(),
-        f"limits of joints or energy changed the torques of {changed} ticks": changed > 0,
-        f"not in the scenario: {'; '.join(foreign)}": bool(foreign),
+        f"joint limits or energy gates changed the torque in {changed} ticks": changed > 0,
+        f"external influence: {'; '.join(foreign)}": bool(foreign),
     }
     for reason, holds in reasons.items():
         if holds:
@@ -234,18 +234,17 @@ def _require(recorded: Recorded, subtask: str, outside: list[Influence]) -> None
 
 
 def _led_motions(recorded: Recorded, subtask: str) -> Iterator[RecordedMotion]:
-    """The desired motion, in pieces without a jump.
+    """Yield the desired motion in segments without jumps.
 
-    A direct take-over follows its references as they come; what is shaped is known from the
-    desired motion that the controller tells, from the first tick on, wherever a law that decouples
-    alone made the torques.
+    With direct takeover these are the references themselves. With shaped takeover it is the
+    published desired motion, wherever a decoupling law alone determined the torques.
     """
     settings = recorded.scenario.subtasks[subtask].input
     if settings.takeover == "shaped":
-        found = account(recorded, subtask)
-        jumped = intervals.jumps(recorded.task(subtask).layout, found.desired)
-        where = found.in_force & intervals.decoupled(found.law) & ~jumped
-        for first, last in intervals.pieces(where):
+        found = storage_balance(recorded, subtask)
+        jumped = intervals.reference_jumps(recorded.task(subtask).layout, found.desired)
+        where = found.in_force & intervals.decoupling_in_force(found.law) & ~jumped
+        for first, last in intervals.segments(where):
             yield select(found.desired, slice(first, last + 1))
         return
     topic = recorded.reference_topic(subtask)
@@ -262,7 +261,7 @@ def _led_motions(recorded: Recorded, subtask: str) -> Iterator[RecordedMotion]:
 
 
 def _thinned(motion: RecordedMotion) -> RecordedMotion:
-    """The same motion by fewer instants, its ends kept."""
+    """Return the motion at fewer times, keeping both ends."""
     step = max(1, round(SPACING / float(np.median(np.diff(motion.t)))))
     rows = np.arange(0, len(motion.t) - 1, step)
     return select(motion, [*rows.tolist(), len(motion.t) - 1])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What acted on a run that its scenario does not foresee."""
+"""External influences on a run that are not part of its scenario."""
 
 from dataclasses import dataclass
 
@@ -12,22 +12,22 @@ from noninteract_ros.reporting.metrics.intervals import laws
 from noninteract_ros.reporting.recording.recorded import Recorded
 from noninteract_ros.sources.announcements import Sampler
 
-FIRST_START = "the first state"  # What the controller says of a start that every run has.
+FIRST_START = "the first state"  # reported by the controller at the start of every run
 INPUTS = ("target_pose", "target_twist", "wrench")
-# Kinds of influences that the desired motion tells of, or the transitions that are counted.
+# Kinds of influences: visible in the desired motion, or counted as transitions.
 MOTION, CHANGE = "motion", "change"
 OTHER = "other"
 
 
 @dataclass(frozen=True)
 class Influence:
-    """Something from outside.
+    """External influence on a run.
 
     Attributes:
-        subtask: Subtask whose input it is; empty where it acts on the team or the controller.
-        text: What it was.
-        kind: `MOTION` where all of it shows in what the subtask is asked to do, `CHANGE` where it
-            is counted while it lasts, or `OTHER`.
+        subtask: Subtask that receives the input; empty for inputs of the team or the controller.
+        text: Description.
+        kind: `MOTION` if fully contained in the desired motion, `CHANGE` if counted as a
+            transition while it lasts, else `OTHER`.
     """
 
     subtask: str
@@ -36,7 +36,7 @@ class Influence:
 
 
 def influences(recorded: Recorded) -> list[Influence]:
-    """Inputs, pushes and changes at run time that the scenario does not hold."""
+    """Return inputs, pushes and changes at run time that are not part of the scenario."""
     scenario = recorded.scenario
     found = [
         Influence("", f"pushes on {name}/push") for name in scenario.robots
@@ -60,41 +60,43 @@ def influences(recorded: Recorded) -> list[Influence]:
                 if recorded.has(f"{prefix}/{kind}")
             ]
             if recorded.has(f"{prefix}/reference"):
-                found += _unforeseen(recorded, subtask, source, samplers.get((subtask, source)))
+                found += _unexpected_references(
+                    recorded, subtask, source, samplers.get((subtask, source))
+                )
     return found + _changes(recorded)
 
 
-def _unforeseen(
+def _unexpected_references(
     recorded: Recorded, subtask: str, source: str, sampler: Sampler | None
 ) -> list[Influence]:
-    """References that the scenario's own source does not give."""
+    """Return references that the scenario's own source does not publish."""
     topic = f"{subtask}/{source}/reference"
     if sampler is None:
         return [Influence(subtask, f"references on {topic}", MOTION)]
     series = recorded.run.trajectory(topic)
     found = []
-    # A source that saw a state twice says again what it has said; that changes nothing.
-    if len(series.contradicted):
-        text = f"different references for the same instant on {topic}"
+    # A source repeats its reference when it receives a state twice; that is no conflict.
+    if len(series.conflicting):
+        text = f"conflicting references with equal stamps on {topic}"
         found.append(Influence(subtask, text, MOTION))
     if not len(series.stamps) or not recorded.lockstep:
-        return found  # In wall time a source counts from when it was started.
-    foreseen, following = set(), -0.5 / recorded.rate
+        return found  # In wall time sources count from their own start.
+    expected, following = set(), -0.5 / recorded.rate
     last = seconds(stamp(series.stamps.max()))
     while (following := sampler.next_sample(following)) <= last:
-        foreseen.add(stamp(following))
+        expected.add(stamp(following))
     stamps = np.round(series.stamps * 1e9).astype(np.int64).tolist()
-    if not foreseen.issuperset(stamps):
-        found.append(Influence(subtask, f"references at other instants on {topic}", MOTION))
+    if not expected.issuperset(stamps):
+        found.append(Influence(subtask, f"references with unexpected stamps on {topic}", MOTION))
     return found
 
 
 def _changes(recorded: Recorded) -> list[Influence]:
-    """Changes of law and authority, stops and new starts, as far as the controller told."""
+    """Return changes of law, gains and authority, stops and restarts that were reported."""
     own = recorded.scenario.general.law
-    told = {str(law) for law in laws(recorded, recorded.t)} - {own}
-    texts = {f"law changed to {law}": None for law in LAWS if law in told}
-    changed: dict[str, None] = {}  # The controller tells of all that were changed so far.
+    in_force = {str(law) for law in laws(recorded, recorded.t)} - {own}
+    texts = {f"law changed to {law}": None for law in LAWS if law in in_force}
+    changed: dict[str, None] = {}  # The controller reports all parameters changed so far.
     for status in recorded.run.diagnostics() if recorded.has("diagnostics") else ():
         if not status["name"].endswith("controller"):
             continue
@@ -103,7 +105,7 @@ def _changes(recorded: Recorded) -> list[Influence]:
             texts[f"law changed to {law}"] = None
         start = values.get("last start", "none")
         if start not in ("none", FIRST_START):
-            texts[f"the controller started anew: {start}"] = None
+            texts[f"the controller restarted: {start}"] = None
         if (names := values.get("changed parameters", "none")) != "none":
             changed |= dict.fromkeys(names.split(", "))
         if status["message"] == "stopped":
@@ -112,13 +114,13 @@ def _changes(recorded: Recorded) -> list[Influence]:
             led_by = values.get(f"{name} led by", spec.input.authority).split(",")[0]
             if led_by not in (spec.input.authority, *spec.input.hand_over_to):
                 texts[f"authority over {name} changed to {led_by}"] = None
-    counts = recorded.told(recorded.stack.names[0], "transitions")
+    counts = recorded.energy_entry(recorded.stack.names[0], "transitions")
     if not texts and not changed and counts is not None and np.ptp(counts[1]) > 0.0:
-        # Too short for a diagnosis in between to tell of it.
-        texts["a stop, a change of law or gains, or a new start"] = None
+        # Shorter than the period of the diagnostics.
+        texts["a stop, a change of law or gains, or a restart"] = None
     found = [Influence("", text, CHANGE) for text in texts]
     if changed:
-        told_of = all(name == "law" or name.endswith(".authority") for name in changed)
-        text = f"parameters were changed: {', '.join(changed)}"
-        found.append(Influence("", text, CHANGE if told_of else OTHER))
+        traced = all(name == "law" or name.endswith(".authority") for name in changed)
+        text = f"parameters changed: {', '.join(changed)}"
+        found.append(Influence("", text, CHANGE if traced else OTHER))
     return found

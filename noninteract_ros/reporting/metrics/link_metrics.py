@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a link between an operator's device and the team must show: it gave nothing away."""
+"""Energy metrics and passivity checks of the link between operator device and team."""
 
 from typing import Any
 
@@ -12,7 +12,7 @@ ROUNDING = 1e-9  # [J]
 
 
 def link_account(recorded: Recorded) -> LabelledSeries | None:
-    """The account as it was published; None where the run has no link or did not record it."""
+    """Return the published account; None if the run has no link or did not record it."""
     haptic = recorded.scenario.haptic
     if haptic is None or not recorded.has(topic := f"{haptic.subtask}/link"):
         return None
@@ -20,16 +20,15 @@ def link_account(recorded: Recorded) -> LabelledSeries | None:
 
 
 def operator_net(account: LabelledSeries) -> Array:
-    """Energy that the operator has put into the link less what came out, shape (n,) [J]."""
+    """Return the net energy that the operator put into the link, shape (n,) [J]."""
     return account["operator_in"] - account["operator_out"]
 
 
 def link_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
-    """Energies at the end, and whether the operator ever drew more than the bound.
+    """Return the final energies and the checks of the operator's energy balance.
 
-    The bound is the reserve and what single ticks can have overdrawn before they were observed.
-
-    A link without a passivity layer promises nothing: its energies are told, not judged.
+    The bound is the reserve plus the largest overdraft of single ticks before they are observed.
+    Without a passivity layer only the energies are reported.
     """
     account, link = link_account(recorded), recorded.scenario.link
     if account is None or link is None:

@@ -1,19 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A passivity observer that trusts nobody: energies from joint states and torques alone.
+"""Independent passivity observer: energies from joint states and torques alone.
 
-From a state to the next, with the torque that was held between them and the energy G in gravity,
+Over one tick, with the held torque tau_k, kinetic energy T and gravitational energy G,
 
     put in    = tau_k' (q_k+1 - q_k) - (G_k+1 - G_k)      by the controls, into the robots
-    received  = (T_k+1 - T_k) - put in                    from whatever else acts on the robots
+    received  = (T_k+1 - T_k) - put in                    from all other forces on the robots
 
-Neither the law nor its account nor a force sensor takes part: kinetic energy, gravity and torques
-are the model's and the recording's. What the law says that it received is another sum, of work on
-its errors e. Forces from outside also work along the references, v_d = S dx_d/dt, and
+The observer uses only the model, recorded states and recorded torques: neither the law nor its
+account nor force sensors. The account of the law sums the work on its errors e. External forces
+also do work along the references, v_d = S dx_d/dt, so that
 
-    received = received by the law + int v_d' tau_e dt,
+    received = received by the account + int v_d' tau_e dt,
 
-with tau_e from the recorded motion as well: M a + C v + g - tau_k in the middle of each tick. To
-the integral belongs what holding J and g over a tick does along references that move.
+with tau_e = M a + C v + g - tau_k from the recorded motion in the middle of each tick. The
+integral includes the effect of the zero-order hold of J and g along moving references.
 """
 
 from dataclasses import dataclass
@@ -25,36 +25,35 @@ from numpy.typing import NDArray
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import RecordingError
 from noninteract_ros.reporting.checks.checks import Check, at_most, not_applicable
-from noninteract_ros.reporting.metrics.intervals import moved_by_itself
+from noninteract_ros.reporting.metrics.intervals import continuous_steps
 from noninteract_ros.reporting.metrics.team_account import TeamAccount, limits_acted, team_account
-from noninteract_ros.reporting.recording.recorded import Recorded, common_instants
+from noninteract_ros.reporting.recording.recorded import Recorded, common_times
 
 CLAIM = "passivity.account"
-# Share of the energy that passed by which the accounts may differ, at 1 kHz: of the references
-# only what telemetry tells of them is known, and they jump in between.
+# Allowed difference of the accounts relative to the energy turnover, at 1 kHz: references are
+# known at the telemetry rate only, and may jump in between.
 SAMPLED = 1e-3
 ROUNDING = 1e-12  # [J]
-BOOKED = "the account books torques of joint limits and singularities as pushes from outside"
-LATE = "wall time: the controller does not see each state, nor when its torques act"
+BOOKED = "the account counts torques of joint limits and singularities as external work"
+LATE = "wall time: the controller does not receive every state, and torques act late"
 
 
 @dataclass(frozen=True)
 class Observation:
     """Energies at the robots at each recorded state, shape (n,) each.
 
-    Sums go over pieces of the run without a gap; at the first state of each they are as at the
-    last state before.
+    Sums run over segments without gaps and continue from one segment to the next.
 
     Attributes:
         t: Time of the run [s].
-        kinetic: T [J].
-        put_in: Energy that the controls put in since the start [J].
-        received: Energy from anything else since the start; negative, where the robots gave [J].
-        along: Its part along the references [J].
-        piece: Number of the piece without a gap.
-        commanded: How many intervals had a torque that was commanded for their first state.
-        applied: How many had a torque that only the robots told of.
-        altered: Largest difference of a command from what the robots told of [N or N m].
+        kinetic: Kinetic energy T [J].
+        put_in: Energy put in by the controls since the start [J].
+        received: Energy received from all other forces since the start; negative if given [J].
+        along: Part of `received` along the references [J].
+        segment: Number of the segment without gaps.
+        commanded: Number of intervals whose torque is a recorded command.
+        applied: Number of intervals whose torque is a measured effort.
+        altered: Largest difference of a command from the measured effort [N or N m].
     """
 
     t: Array
@@ -62,47 +61,56 @@ class Observation:
     put_in: Array
     received: Array
     along: Array
-    piece: NDArray[np.intp]
+    segment: NDArray[np.intp]
     commanded: int
     applied: int
     altered: float
 
     @property
     def gaps(self) -> int:
-        """How many times states are missing, or the team was put elsewhere."""
-        return int(self.piece[-1])
+        """Number of gaps: missing states or resets."""
+        return int(self.segment[-1])
 
     @property
-    def unseen(self) -> float:
-        """Time in gaps [s]."""
-        return float(np.diff(self.t)[np.diff(self.piece) > 0].sum())
+    def gap_time(self) -> float:
+        """Total time of the gaps [s]."""
+        return float(np.diff(self.t)[np.diff(self.segment) > 0].sum())
 
 
 def observe(recorded: Recorded) -> Observation:
-    """Energies at the robots from what joint states and commands say."""
-    seen = (np.diff(recorded.ticks) == 1) & moved_by_itself(recorded)
+    """Compute the energies at the robots from joint states and commands."""
+    valid = (np.diff(recorded.ticks) == 1) & continuous_steps(recorded)
     finite = np.isfinite(np.hstack((recorded.q, recorded.v, recorded.torque))).all(axis=1)
-    seen &= finite[1:] & finite[:-1]
-    rows = np.flatnonzero(seen)
+    valid &= finite[1:] & finite[:-1]
+    rows = np.flatnonzero(valid)
     torque, commanded = _torques(recorded, rows)
-    way = recorded.steps[rows]
+    steps_q = recorded.steps[rows]
     kinetic, gravity = _energies(recorded, np.flatnonzero(finite))
     steps = np.zeros((3, len(recorded.t) - 1))
-    steps[0, rows] = (torque * way).sum(axis=1) - np.diff(gravity)[rows]
+    steps[0, rows] = (torque * steps_q).sum(axis=1) - np.diff(gravity)[rows]
     steps[1, rows] = np.diff(kinetic)[rows] - steps[0, rows]
-    steps[2, rows] = _work_along(recorded, rows, torque, way)
+    steps[2, rows] = _work_along(recorded, rows, torque, steps_q)
     put_in, received, along = (np.concatenate(([0.0], np.cumsum(row))) for row in steps)
-    piece = np.concatenate(([0], np.cumsum(~seen)))
+    segment = np.concatenate(([0], np.cumsum(~valid)))
     altered = float(np.abs(torque - recorded.torque[rows + 1]).max(initial=0.0))
-    counts = int(commanded.sum()), int((~commanded).sum())
-    return Observation(recorded.t, kinetic, put_in, received, along, piece, *counts, altered)
+    return Observation(
+        t=recorded.t,
+        kinetic=kinetic,
+        put_in=put_in,
+        received=received,
+        along=along,
+        segment=segment,
+        commanded=int(commanded.sum()),
+        applied=int((~commanded).sum()),
+        altered=altered,
+    )
 
 
 def _torques(recorded: Recorded, rows: NDArray[np.intp]) -> tuple[Array, NDArray[np.bool_]]:
-    """Torque held after each of some states, shape (m, n), and whether it is a command's.
+    """Return the torque held after states, shape (m, n), and True where it is a command.
 
-    In lockstep that is the command with the stamp of the state. In wall time commands act late,
-    and only the effort of the next state says which one did.
+    In lockstep it is the command with the stamp of the state. In wall time commands act late; the
+    effort of the next state is the torque that acted.
     """
     torque, commanded = recorded.torque[rows + 1], np.zeros(len(rows), dtype=bool)
     if not recorded.lockstep or not recorded.has("joint_commands"):
@@ -120,7 +128,7 @@ def _torques(recorded: Recorded, rows: NDArray[np.intp]) -> tuple[Array, NDArray
 
 
 def _energies(recorded: Recorded, rows: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Kinetic energy and energy in gravity at all states, shape (n,) each; NaN but at some."""
+    """Return kinetic and gravitational energy at all states, shape (n,); NaN except at `rows`."""
     team, still = recorded.team, np.zeros(recorded.team.n)
     kinetic, gravity = np.full((2, len(recorded.t)), np.nan)
     if recorded.constant:
@@ -136,10 +144,12 @@ def _energies(recorded: Recorded, rows: NDArray[np.intp]) -> tuple[Array, Array]
     return kinetic, gravity
 
 
-def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, way: Array) -> Array:
-    """Work of all that acts from outside along the references, over some ticks, shape (m,) [J].
+def _work_along(
+    recorded: Recorded, rows: NDArray[np.intp], torque: Array, steps_q: Array
+) -> Array:
+    """Return the work of external forces along the references in each tick, shape (m,) [J].
 
-    NaN where nobody recorded the references.
+    NaN if the references were not recorded.
     """
     work = np.zeros(len(rows))
     wanted = _desired_velocity(recorded, recorded.t[rows])
@@ -148,7 +158,7 @@ def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, way: 
     team, rate = recorded.team, recorded.rate
     for number in np.flatnonzero(wanted.any(axis=1)):
         row = rows[number]
-        q = team.integrate(recorded.q[row], 0.5 * way[number])
+        q = team.integrate(recorded.q[row], 0.5 * steps_q[number])
         v = 0.5 * (recorded.v[row] + recorded.v[row + 1])
         acceleration = (recorded.v[row + 1] - recorded.v[row]) * rate
         external = team.inverse_dynamics(q, v, acceleration) - torque[number]
@@ -160,7 +170,7 @@ def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, way: 
         except np.linalg.LinAlgError:
             work[number] = np.nan
             continue
-        # Over the tick the law counts with gravity and Jacobian as they were when it began.
+        # The law uses gravity and Jacobian of the start of the tick.
         drift = team.gravity(recorded.q[row]) - state.g
         held = 0.5 / rate * (torque[number] - state.g) @ turned
         work[number] = (along @ (external + drift) - held) / rate
@@ -168,10 +178,10 @@ def _work_along(recorded: Recorded, rows: NDArray[np.intp], torque: Array, way: 
 
 
 def _desired_velocity(recorded: Recorded, t: Array) -> Array | None:
-    """Mean desired velocities of all subtasks in the ticks that begin at t, shape (len(t), n).
+    """Return mean desired velocities over the ticks that begin at t, shape (len(t), n).
 
-    Where telemetry tells of a tick its motion goes on to the next one, at which it may jump. In
-    between nobody knows more than the ends. None if it was not recorded.
+    Ticks with telemetry are extrapolated to the next tick, where references may jump; other ticks
+    are interpolated. None if the desired motion was not recorded.
     """
     found, half = np.empty((len(t), recorded.team.n)), 0.5 / recorded.rate
     try:
@@ -182,71 +192,71 @@ def _desired_velocity(recorded: Recorded, t: Array) -> Array | None:
             part = recorded.part(name)
             columns = [np.interp(t + half, motion.t, column) for column in motion.velocity.T]
             found[:, part] = np.array(columns).T
-            rows, told = common_instants(t, motion.t)
-            found[rows, part] = motion.velocity[told] + half * motion.acceleration[told]
+            rows, others = common_times(t, motion.t)
+            found[rows, part] = motion.velocity[others] + half * motion.acceleration[others]
     except RecordingError:
         return None
     return found
 
 
-def surroundings_work(seen: Observation) -> tuple[Array, Array]:
-    """Times and what the law's account should say that it received, shape (m,) each [s, J]."""
-    return seen.t, seen.received - seen.along
+def external_work(observed: Observation) -> tuple[Array, Array]:
+    """Return times and the received work expected in the account, shape (m,) each [s, J]."""
+    return observed.t, observed.received - observed.along
 
 
 def passivity_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
-    """What was observed, and whether the law's own account says the same."""
+    """Return the observed energies and the check of the account of the law against them."""
     seen = observe(recorded)
     metrics: dict[str, Any] = {
         "gaps": seen.gaps,
-        "not_seen_s": seen.unseen,
+        "gaps_s": seen.gap_time,
         "torques_commanded": seen.commanded,
         "torques_applied": seen.applied,
-        "torques_altered_by": seen.altered,
-        "put_in_by_controls_J": float(seen.put_in[-1]),
+        "max_command_mismatch": seen.altered,
+        "control_work_J": float(seen.put_in[-1]),
         "kinetic_J": float(seen.kinetic[-1]),
         "received_J": float(seen.received[-1]),
-        "given_at_most_J": float(-seen.received.min()),
+        "max_given_J": float(-seen.received.min()),
         "along_references_J": float(seen.along[-1]),
     }
     try:
-        told = team_account(recorded)
+        account = team_account(recorded)
     except RecordingError as error:
         reason = str(error)
         metrics["account"] = {"reason": reason}
         return metrics, [not_applicable(CLAIM, 0.0, "J", reason)]
     if np.isnan(seen.along).any():
-        reason = "references or joint states are missing or no numbers"
+        reason = "references or joint states are missing or not finite"
         metrics["account"] = {"reason": reason}
         return metrics, [not_applicable(CLAIM, 0.0, "J", reason)]
-    apart, turnover = _disagreement(seen, told)
-    told_at = min(recorded.rate, recorded.scenario.general.telemetry_rate)
-    limit = SAMPLED * turnover * 1000.0 / told_at + ROUNDING
+    difference, turnover = _disagreement(seen, account)
+    telemetry_rate = min(recorded.rate, recorded.scenario.general.telemetry_rate)
+    limit = SAMPLED * turnover * 1000.0 / telemetry_rate + ROUNDING
     metrics["account"] = {
-        "disagreement_J": apart,
+        "disagreement_J": difference,
         "turnover_J": turnover,
         "allowed_J": limit,
     }
     reason = "" if recorded.lockstep else LATE
-    if limits_acted(recorded, told):
+    if limits_acted(recorded, account):
         reason = BOOKED
     if reason:
         return metrics, [not_applicable(CLAIM, limit, "J", reason)]
-    return metrics, [at_most(CLAIM, apart, limit, "J")]
+    return metrics, [at_most(CLAIM, difference, limit, "J")]
 
 
-def _disagreement(seen: Observation, told: TeamAccount) -> tuple[float, float]:
-    """Largest difference of both accounts, and how much energy passed in the steps seen [J].
+def _disagreement(observed: Observation, account: TeamAccount) -> tuple[float, float]:
+    """Return the largest difference of both accounts and the energy turnover [J].
 
-    Both are compared within pieces without a gap in the recording and without a new account.
+    The accounts are compared within segments without gaps and without a reset of the account.
     """
-    rows, others = common_instants(seen.t, told.t)
-    _, expected = surroundings_work(seen)
-    difference = told.received[others] - expected[rows]
-    pieces = np.stack((seen.piece[rows], told.account[others]), axis=1)
-    starts = np.flatnonzero(np.diff(pieces, axis=0, prepend=pieces[:1] - 1).any(axis=1))
-    apart = 0.0
-    for piece in np.split(difference, starts[1:]):
-        apart = max(apart, float(np.abs(piece - piece[0]).max()))
-    passed = np.abs(np.diff(seen.put_in)) + np.abs(np.diff(seen.kinetic))
-    return apart, float(np.nansum(passed))
+    rows, others = common_times(observed.t, account.t)
+    _, expected = external_work(observed)
+    difference = account.received[others] - expected[rows]
+    labels = np.stack((observed.segment[rows], account.account[others]), axis=1)
+    starts = np.flatnonzero(np.diff(labels, axis=0, prepend=labels[:1] - 1).any(axis=1))
+    largest = 0.0
+    for segment in np.split(difference, starts[1:]):
+        largest = max(largest, float(np.abs(segment - segment[0]).max()))
+    passed = np.abs(np.diff(observed.put_in)) + np.abs(np.diff(observed.kinetic))
+    return largest, float(np.nansum(passed))

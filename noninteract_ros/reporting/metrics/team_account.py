@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The energy account that the controller told of, for the port where its team is touched."""
+"""Energy account of the team at its external port, as published by the controller."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,38 +13,38 @@ from noninteract_ros.control.energy.gate import GATED
 from noninteract_ros.errors import RecordingError
 from noninteract_ros.reporting.checks.checks import Check, at_least, at_most, not_applicable
 from noninteract_ros.reporting.metrics.intervals import laws
-from noninteract_ros.reporting.recording.recorded import INTERVENTIONS, Recorded, common_instants
+from noninteract_ros.reporting.recording.recorded import INTERVENTIONS, Recorded, common_times
 
 TOPIC = "energy"
-LIMITS = ("limit", "too fast", "singularity", "no finite torque")  # in what a controller says
-# Shares of the largest sum that rounding may add to the residual at a tick.
+LIMITS = ("limit", "too fast", "singularity", "no finite torque")  # in controller diagnostics
+# Rounding error of the residual per tick, relative to the largest sum.
 ROUNDING = 64.0 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class TeamAccount:
-    """The account over time, shape (n,) each.
+    """Energy account over time, shape (n,) each.
 
     Attributes:
         t: Time of the run [s].
-        gated: Whether the law in force has gates.
+        gated: True where the law in force has gates.
         storage: T + nu U of the errors [J].
         supplied: Power at the physical port [W].
-        dissipated: Power that the impedance takes [W].
+        dissipated: Power dissipated by the impedance [W].
         demand: Power that complete decoupling would inject [W].
         tank: Energy in the tank [J].
-        owed: Energy that must come in before sigma may rise [J].
+        owed: Energy that must be received before sigma may rise [J].
         reserve: Energy in the reserve [J].
-        sigma: Gate of the decoupling.
-        grip: Gate of the impedance.
-        residual: What all storage grew by beyond all that came in [J].
-        received: Work of the surroundings since the account began [J].
+        sigma: Decoupling gate.
+        grip: Impedance gate nu.
+        residual: Growth of all storage beyond all received energy [J].
+        received: Work of the environment since the start of the account [J].
         measured: Integral of `supplied` since then [J].
-        brought: Energy that moved references brought since then [J].
-        credit: Energy granted for them since then [J].
+        brought: Energy injected by moving references since then [J].
+        credit: Energy granted for moving references since then [J].
         refilled: Energy granted by an operator since then [J].
-        lost: Energy withheld or spilt since then [J].
-        account: Number of the account; sums begin anew with it.
+        lost: Energy withheld or discarded since then [J].
+        account: Number of the account; all sums restart with it.
     """
 
     t: Array
@@ -69,7 +69,7 @@ class TeamAccount:
 
 
 def team_account(recorded: Recorded) -> TeamAccount:
-    """The account as it was told.
+    """Return the published account.
 
     Raises:
         RecordingError: The topic is missing, of another type, empty or without one of its labels.
@@ -84,8 +84,8 @@ def team_account(recorded: Recorded) -> TeamAccount:
 
 
 def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
-    """Gates, levels and residual of the account."""
-    names = ("account.residual", "account.sigma", "account.grip")
+    """Return metrics and checks of gates, levels and residual of the account."""
+    names = ("account.residual", "account.sigma", "account.nu")
     try:
         found = team_account(recorded)
     except RecordingError as error:
@@ -96,8 +96,8 @@ def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
         "gated_s": float(steps[gated].sum()),
         "sigma_min": float(found.sigma[gated].min()) if gated.any() else None,
         "sigma_below_1_s": float(steps[gated & (found.sigma < 1.0)].sum()),
-        "grip_min": float(found.grip[gated].min()) if gated.any() else None,
-        "grip_below_1_s": float(steps[gated & (found.grip < 1.0)].sum()),
+        "nu_min": float(found.grip[gated].min()) if gated.any() else None,
+        "nu_below_1_s": float(steps[gated & (found.grip < 1.0)].sum()),
         "residual_max_J": float(found.residual.max()),
         "tank_min_J": float(found.tank.min()),
         "tank_max_J": float(found.tank.max()),
@@ -111,7 +111,7 @@ def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
     }
     checks = [at_most(names[0], metrics["residual_max_J"], _rounding(recorded, found), "J")]
     reason = _may_close(recorded, found)
-    for name, lowest in zip(names[1:], ("sigma_min", "grip_min"), strict=True):
+    for name, lowest in zip(names[1:], ("sigma_min", "nu_min"), strict=True):
         checks.append(
             not_applicable(name, 1.0, "", reason)
             if reason
@@ -121,42 +121,42 @@ def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
 
 
 def _rounding(recorded: Recorded, found: TeamAccount) -> float:
-    """Largest residual that rounding of all sums can make [J]."""
+    """Return the largest residual due to rounding of all sums [J]."""
     sums = (found.storage, found.tank, found.reserve, found.received, found.brought, found.lost)
     scale = sum(float(np.abs(item).max()) for item in sums)
     return ROUNDING * len(recorded.t) * scale
 
 
 def _may_close(recorded: Recorded, found: TeamAccount) -> str:
-    """Why a gate may close in this run, or an empty text."""
+    """Return the reason why a gate may close in this run, or an empty text."""
     scenario = recorded.scenario
     if not found.gated.any():
         return f"law {scenario.general.law} has no gates"
     if not recorded.lockstep:
         return "wall time: torques act late, which costs energy"
     if touched := [*scenario.surroundings, *scenario.pushes]:
-        return f"what the team touches may close a gate: {', '.join(touched)}"
+        return f"contact may close a gate: {', '.join(touched)}"
     if any(recorded.has(f"{robot}/push") for robot in scenario.robots):
-        return "somebody pushed the team, which may close a gate"
+        return "external pushes may close a gate"
     if limits_acted(recorded, found):
-        return "singularities or limits of joints acted, which may close a gate"
+        return "joint limits or singularities may close a gate"
     return ""
 
 
 def limits_acted(recorded: Recorded, found: TeamAccount) -> bool:
-    """Whether anything but a gate changed the law's torque.
+    """Return True if joint limits or singularities changed the torque of the law.
 
-    As far as the controller's diagnostics say so, and as open gates let one see it.
+    Detected from the controller diagnostics, and from interventions while both gates are open.
     """
     statuses = recorded.run.diagnostics() if recorded.has("diagnostics") else []
     for status in statuses:
-        told = status["name"].endswith("controller") and status["message"]
-        if told and any(word in told for word in LIMITS):
+        message = status["name"].endswith("controller") and status["message"]
+        if message and any(word in message for word in LIMITS):
             return True
     series = recorded.run.labelled(f"{recorded.stack.names[0]}/energy")
     if INTERVENTIONS not in series.labels:
         return False
-    rows, others = common_instants(recorded.since_start(series.stamps), found.t)
-    opened = (found.sigma[others] == 1.0) & (found.grip[others] == 1.0)
+    rows, others = common_times(recorded.since_start(series.stamps), found.t)
+    both_open = (found.sigma[others] == 1.0) & (found.grip[others] == 1.0)
     more = np.diff(series[INTERVENTIONS][rows]) > 0.0
-    return bool((more & opened[1:] & opened[:-1]).any())
+    return bool((more & both_open[1:] & both_open[:-1]).any())

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings: MCAP files written, repaired and read back as arrays."""
+"""Recordings: writing, repairing and reading MCAP files as arrays."""

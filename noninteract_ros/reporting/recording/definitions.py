@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Message definitions as MCAP wants them: one text that holds a type and all it is made of."""
+"""Concatenated ROS message definitions for MCAP schemas (encoding `ros2msg`)."""
 
 import os
 import re
@@ -17,23 +17,23 @@ _SEPARATOR = "=" * 80
 
 @cache
 def definition(type_name: str) -> str:
-    """The concatenated definition (schema encoding `ros2msg`) of a message type.
+    """Return the definition of a message type with those of all nested types.
 
     Args:
         type_name: E.g. `sensor_msgs/msg/JointState`.
 
     Raises:
-        RecordingError: The `.msg` file of the type, or of one that it contains, is not installed.
+        RecordingError: The `.msg` file of the type or of a nested type is not installed.
     """
     package, name = _split(type_name)
     parts = {(package, name): _source(package, name)}
-    waiting = [(package, name)]
-    while waiting:
-        owner = waiting.pop(0)
+    pending = [(package, name)]
+    while pending:
+        owner = pending.pop(0)
         for used in _used_types(parts[owner], owner[0]):
             if used not in parts:
                 parts[used] = _source(*used)
-                waiting.append(used)
+                pending.append(used)
     root, *others = parts.items()
     texts = [root[1]] + [f"MSG: {'/'.join(key)}\n{text}" for key, text in others]
     return f"\n{_SEPARATOR}\n".join(texts)
@@ -49,7 +49,7 @@ def _split(type_name: str) -> tuple[str, str]:
 
 
 def _used_types(text: str, package: str) -> Iterator[tuple[str, str]]:
-    """Package and name of each message type among the fields of a definition."""
+    """Yield package and name of each message type among the fields of a definition."""
     for line in text.splitlines():
         if match := _FIELD.match(line.split("#")[0]):
             yield match[1] or package, match[2]
@@ -67,6 +67,6 @@ def _source(package: str, name: str) -> str:
 
 
 def _share_folders() -> list[Path]:
-    """Where installed message packages keep their definitions: overlays first, then Python's."""
+    """Return the `share` folders of message packages: overlays first, then Python's."""
     prefixes = [part for part in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if part]
     return [Path(prefix) / "share" for prefix in [*prefixes, sysconfig.get_path("data")]]

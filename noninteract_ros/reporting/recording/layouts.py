@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Layouts of serialized messages: where the numbers stand, and which bytes tell the layout.
+"""Layouts of serialized messages: offsets of the numbers, and the bytes that fix them.
 
-Messages of one topic nearly always differ in their numbers only. Such messages are decoded
-together: one is walked field by field, and all others whose counts and texts are byte for byte
-the same are read by numpy at the same offsets. Padding is left out of the comparison, since
-serializers leave anything in it.
+Messages of one topic usually differ in their numbers only. Such messages are decoded together:
+one message is walked field by field. All others with identical counts and texts are read by numpy
+at the same offsets. Padding bytes are not compared, since serializers leave them undefined.
 """
 
 import struct
@@ -18,12 +17,12 @@ from numpy.typing import NDArray
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
 
-_ORIGIN = 4  # bytes of encapsulation header; alignment counts from behind it
+_ORIGIN = 4  # bytes of encapsulation header; alignment is relative to its end
 _LITTLE_ENDIAN = b"\x00\x01"
 
 
 class Block(NamedTuple):
-    """A run of float64: byte offset of the first, and how many."""
+    """Consecutive float64 numbers: byte offset of the first, and their count."""
 
     offset: int
     length: int
@@ -31,14 +30,14 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class MessageLayout:
-    """Where things stand in one message.
+    """Layout of one serialized message.
 
     Attributes:
         fixed: Offsets of the bytes (counts, texts) that another message of the same layout
             shares, shape (m,).
-        names: Joints, elements or labels.
-        blocks: Number fields by name.
-        stamp: Offset of `header.stamp`; None where the type has no header.
+        names: Joint names, element names or labels.
+        blocks: Numeric fields by name.
+        stamp: Offset of `header.stamp`; None if the type has no header.
     """
 
     fixed: NDArray[np.intp]
@@ -48,10 +47,13 @@ class MessageLayout:
 
 
 class CdrWalker:
-    """Walks through one serialized message in the order of its fields."""
+    """Sequential reader of one serialized message, in the order of its fields."""
 
     def __init__(self, data: bytes) -> None:
-        """Args: data: CDR bytes with the encapsulation header.
+        """Start at the first field.
+
+        Args:
+            data: CDR bytes with the encapsulation header.
 
         Raises:
             InputError: The message is not plain little-endian CDR.
@@ -65,7 +67,7 @@ class CdrWalker:
         self._fixed = [np.arange(2)]
 
     def count(self) -> int:
-        """Reads a uint32 that is part of the layout."""
+        """Read a uint32 that is part of the layout."""
         start = self._align(4)
         self._take(4)
         self._keep(start)
@@ -73,26 +75,26 @@ class CdrWalker:
         return int(value)
 
     def text(self) -> str:
-        """Reads a string; it is part of the layout."""
+        """Read a string that is part of the layout."""
         length = self.count()
         start = self._take(length)
         self._keep(start)
         return self._data[start : start + length].rstrip(b"\0").decode()
 
     def skip(self, size: int, count: int = 1) -> int:
-        """Passes over numbers of `size` bytes each; returns the offset of the first."""
+        """Skip `count` numbers of `size` bytes each; return the offset of the first."""
         start = self._align(size)
         self._take(size * count)
         return start
 
     def doubles(self, count: int) -> Block:
-        """Passes over float64; none at all take no room, not even padding."""
+        """Skip `count` float64 numbers; an empty block has no padding."""
         return Block(self.skip(8, count) if count else self._at, count)
 
     def layout(
         self, names: tuple[str, ...], blocks: dict[str, Block], stamp: int | None = None
     ) -> MessageLayout:
-        """What was walked, as a layout."""
+        """Return the layout of the fields read so far."""
         return MessageLayout(np.concatenate(self._fixed), names, blocks, stamp)
 
     def _align(self, size: int) -> int:
@@ -113,7 +115,7 @@ Walker = Callable[[bytes], MessageLayout]
 
 
 def joint_state(data: bytes) -> MessageLayout:
-    """MessageLayout of a sensor_msgs/msg/JointState."""
+    """Lay out a sensor_msgs/msg/JointState."""
     walk = CdrWalker(data)
     stamp = _header(walk)
     names = _texts(walk)
@@ -122,7 +124,7 @@ def joint_state(data: bytes) -> MessageLayout:
 
 
 def trajectory(data: bytes) -> MessageLayout:
-    """Lay out a MultiDOFJointTrajectory, of which the first point counts."""
+    """Lay out the first point of a trajectory_msgs/msg/MultiDOFJointTrajectory."""
     walk = CdrWalker(data)
     stamp = _header(walk)
     names = _texts(walk)
@@ -135,7 +137,7 @@ def trajectory(data: bytes) -> MessageLayout:
 
 
 def wrench_stamped(data: bytes) -> MessageLayout:
-    """MessageLayout of a geometry_msgs/msg/WrenchStamped; its one name is the frame."""
+    """Lay out a geometry_msgs/msg/WrenchStamped; its only name is the frame."""
     walk = CdrWalker(data)
     stamp = walk.skip(4, 2)
     frame = walk.text()
@@ -143,7 +145,7 @@ def wrench_stamped(data: bytes) -> MessageLayout:
 
 
 def float64_multi_array(data: bytes) -> MessageLayout:
-    """Lay out a Float64MultiArray, named by the labels of its dimensions."""
+    """Lay out a std_msgs/msg/Float64MultiArray; names are the labels of its dimensions."""
     walk = CdrWalker(data)
     labels = []
     for _ in range(walk.count()):
@@ -167,9 +169,9 @@ class Group(NamedTuple):
     """Messages of one layout.
 
     Attributes:
-        layout: Their layout.
-        rows: Which messages they are, ascending, shape (m,).
-        data: Their bytes, shape (m, length).
+        layout: Common layout.
+        rows: Indices of the messages, ascending, shape (m,).
+        data: Serialized messages, shape (m, length).
     """
 
     layout: MessageLayout
@@ -177,12 +179,12 @@ class Group(NamedTuple):
     data: NDArray[np.uint8]
 
     def doubles(self, block: Block) -> Array:
-        """The numbers of a block, shape (m, count)."""
+        """Return the numbers of a block, shape (m, count)."""
         part = self.data[:, block.offset : block.offset + 8 * block.length]
         return np.ascontiguousarray(part).view("<f8")
 
     def stamps(self) -> Array:
-        """`header.stamp` of each message [s], shape (m,)."""
+        """Return `header.stamp` of each message [s], shape (m,)."""
         assert self.layout.stamp is not None
         part = self.data[:, self.layout.stamp : self.layout.stamp + 8]
         parts = np.ascontiguousarray(part).view([("sec", "<i4"), ("nanosec", "<u4")])[:, 0]
@@ -190,10 +192,10 @@ class Group(NamedTuple):
 
 
 def group_by_layout(messages: list[bytes], walker: Walker) -> list[Group]:
-    """Sorts messages by layout.
+    """Group messages by layout.
 
     Raises:
-        InputError: A message is not what its type says; the text names its index.
+        InputError: A message does not match its type; the text names its index.
     """
     by_length: dict[int, list[int]] = {}
     for index, message in enumerate(messages):

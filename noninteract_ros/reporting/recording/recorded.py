@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded run together with the scenario it was recorded with, in the law's coordinates."""
+"""A recorded run with its scenario, as arrays in the coordinates of the law."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -23,18 +23,18 @@ from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.robot import AXES
 
 INTERVENTIONS = "interventions"
-FRICTION = "the joints have friction, which neither the law nor a sensor at a tool knows"
+FRICTION = "joint friction is unknown to the law and not measured at the tools"
 
 
 @dataclass(frozen=True)
 class RecordedMotion:
-    """A motion of one subtask at some instants.
+    """Motion of one subtask over time.
 
     Attributes:
         t: Time of the run, shape (n,) [s].
-        position: Values, with the quaternions of rotating elements, shape (n, size).
-        velocity: Shape (n, p) [m/s; rad/s].
-        acceleration: Shape (n, p) [m/s^2; rad/s^2]; NaN where it was not sent.
+        position: Values with quaternions of rotating elements, shape (n, size) [m; rad].
+        velocity: Velocities, shape (n, p) [m/s; rad/s].
+        acceleration: Accelerations, shape (n, p) [m/s^2; rad/s^2]; NaN where not published.
     """
 
     t: Array
@@ -45,7 +45,7 @@ class RecordedMotion:
 
 @dataclass(frozen=True)
 class Tracking:
-    """Actual and desired motion of one subtask at the same instants.
+    """Actual and desired motion of one subtask at the same times.
 
     Attributes:
         t: Time of the run, shape (n,) [s].
@@ -59,25 +59,25 @@ class Tracking:
 
 
 class Recorded:
-    """What was recorded, as arrays in the order of the team's joints and the subtasks' axes.
+    """A recorded run in the order of the team's joints and the subtasks' axes.
 
-    The time of the run is simulated time in lockstep; otherwise it counts from the first state.
+    The time of the run is simulated time in lockstep; in wall time it starts at the first state.
 
     Args:
         run: The recording.
 
     Attributes:
-        scenario: The scenario it holds.
+        scenario: Scenario of the recording.
         team: The robots.
         stack: Their subtasks.
-        ticks: Number of each state's tick, shape (n,).
-        t: Time of each state, shape (n,) [s].
-        q: Configurations, shape (n, nq).
-        v: Velocities, shape (n, n).
-        torque: Torques that were held until each state, shape (n, n).
+        ticks: Tick number of each state, shape (m,).
+        t: Time of each state, shape (m,) [s].
+        q: Configurations, shape (m, nq).
+        v: Velocities, shape (m, n).
+        torque: Torques held until each state, shape (m, n) [N or N m].
 
     Raises:
-        RecordingError: The recording holds no scenario, a wrong one, or not the joint states.
+        RecordingError: The scenario is missing or invalid, or joint states are missing.
     """
 
     def __init__(self, run: Run) -> None:
@@ -87,7 +87,7 @@ class Recorded:
         self.stack = self.scenario.build_stack(self.team)
         self.states = run.joints("joint_states")
         if len(self.states.stamps) < 2:
-            raise RecordingError(f"{run.path}: holds fewer than 2 joint states")
+            raise RecordingError(f"{run.path}: fewer than 2 joint states")
         general = self.scenario.general
         self.rate, self.lockstep = general.rate, general.lockstep
         self._origin = 0.0 if self.lockstep else float(self.states.stamps[0])
@@ -107,31 +107,31 @@ class Recorded:
 
     @cached_property
     def constant(self) -> bool:
-        """Whether all inertias and Jacobians are constant: point masses and their positions."""
-        turning = len(self.team.q0) > self.team.n  # Continuous joints are no plain numbers.
-        if turning or any(task.rotates for task in self.stack.subtasks):
+        """True if all inertias and Jacobians are constant: positions of point masses."""
+        continuous = len(self.team.q0) > self.team.n  # Continuous joints have two coordinates.
+        if continuous or any(task.rotates for task in self.stack.subtasks):
             return False
-        step, still = np.random.default_rng(0).uniform(-0.5, 0.5, (2, self.team.n))
+        step, velocity = np.random.default_rng(0).uniform(-0.5, 0.5, (2, self.team.n))
         here = self.team.state(self.team.q0, np.zeros(self.team.n))
-        there = self.team.state(self.team.integrate(self.team.q0, step), still)
+        there = self.team.state(self.team.integrate(self.team.q0, step), velocity)
         J, moved = (self.stack.evaluate(state) for state in (here, there))
         same = np.allclose(here.M, there.M) and np.allclose(J.J, moved.J)
         return bool(same and not there.C.any() and not moved.J_rate.any())
 
     @cached_property
     def steps(self) -> Array:
-        """Tangent vectors from each state to the next, shape (n - 1, n)."""
+        """Tangent vectors from each state to the next, shape (m - 1, n)."""
         if self.q.shape[1] == self.team.n:
             return np.diff(self.q, axis=0)
         return np.array([self.team.difference(*pair) for pair in pairwise(self.q)])
 
     @cached_property
     def values(self) -> tuple[Array, Array]:
-        """Subtask values (n, size) and velocities (n, p) at each state."""
+        """Subtask values (m, size) and velocities (m, n) at each state."""
         return self.task_values(self.q, self.v)
 
     def task_values(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Subtask values and velocities of states q (n, nq) and v (n, n)."""
+        """Return subtask values and velocities of states q (m, nq) and v (m, n)."""
         if self.constant:
             q0 = self.team.q0
             task = self.stack.evaluate(self.team.state(q0, np.zeros(self.team.n)))
@@ -144,29 +144,29 @@ class Recorded:
 
     @property
     def value_size(self) -> int:
-        """How many numbers all subtasks' values have."""
+        """Size of the values of all subtasks."""
         return self.stack.value_slices[-1].stop
 
     def part(self, name: str) -> slice:
-        """Coordinates of a subtask among all."""
+        """Return the coordinates of a subtask in the stacked vectors."""
         return self.stack.slices[self.stack.names.index(name)]
 
     def task(self, name: str) -> Subtask:
-        """A subtask by name."""
+        """Return a subtask by name."""
         return self.stack.subtasks[self.stack.names.index(name)]
 
     def has(self, topic: str) -> bool:
-        """Whether the recording has messages of a topic, given by the end of its name."""
+        """Return True if a topic whose name ends in `topic` was recorded."""
         return any(name.endswith(f"/{topic}") for name in self.run.topics)
 
     def team_topic(self, name: str) -> str:
-        """Full name of a topic of the team itself, which some subtask's may end with as well."""
+        """Return the full name of a topic in the team's own namespace."""
         ends = (topic for topic in self.run.topics if topic.endswith("/joint_states"))
-        states = min(ends, key=len)  # A robot may have one of its own, in a deeper namespace.
+        states = min(ends, key=len)  # Robots may publish theirs in deeper namespaces.
         return states.removesuffix("joint_states") + name
 
     def motion(self, topic: str, subtask: str) -> RecordedMotion:
-        """State, desired motion or references of a subtask.
+        """Return the state, desired motion or references of a subtask.
 
         Raises:
             RecordingError: The topic is missing or of another type.
@@ -182,28 +182,31 @@ class Recorded:
         return RecordedMotion(t, *(_coordinates(task, series, *pair) for pair in pairs))
 
     def tracking(self, subtask: str) -> Tracking:
-        """Actual and desired motion of a subtask at the instants that both have.
+        """Return actual and desired motion of a subtask at their common times.
 
         Raises:
             RecordingError: A topic is missing or of another type.
         """
         actual = self.motion(f"{subtask}/state", subtask)
         desired = self.motion(f"{subtask}/desired", subtask)
-        rows, others = common_instants(actual.t, desired.t)
+        rows, others = common_times(actual.t, desired.t)
         return Tracking(actual.t[rows], select(actual, rows), select(desired, others))
 
     def since_start(self, stamps: Array) -> Array:
-        """Time of the run of stamps [s]."""
+        """Convert stamps to the time of the run [s]."""
         return stamps - self._origin
 
     def reference_topic(self, subtask: str) -> str | None:
-        """Topic of the references that lead a subtask; None where nobody does, or says so."""
+        """Return the reference topic of the leading source; None if it was not recorded."""
         authority = self.scenario.subtasks[subtask].input.authority
         topic = f"{subtask}/{authority}/reference"
         return topic if self.has(topic) else None
 
-    def told(self, subtask: str, label: str) -> tuple[Array, Array] | None:
-        """Times [s] and values of a number on a subtask's account, shape (n,) each, if told."""
+    def energy_entry(self, subtask: str, label: str) -> tuple[Array, Array] | None:
+        """Return times [s] and values of one entry of `SUBTASK/energy`, shape (n,) each.
+
+        None if the topic or the entry was not recorded.
+        """
         if not self.has(topic := f"{subtask}/energy"):
             return None
         series = self.run.labelled(topic)
@@ -212,16 +215,16 @@ class Recorded:
         return self.since_start(series.stamps), series[label]
 
     def interventions(self, end: float = np.inf) -> int:
-        """Ticks up to a time [s] whose torque was another one than the law's, as it was told."""
-        if (told := self.told(self.stack.names[0], INTERVENTIONS)) is None:
+        """Return the number of ticks up to a time [s] whose torque was not the law's own."""
+        if (entry := self.energy_entry(self.stack.names[0], INTERVENTIONS)) is None:
             return 0
-        t, counts = told
+        t, counts = entry
         return int(counts[t <= end].max(initial=0.0))
 
     def start(self, subtask: str) -> float | None:
-        """When a subtask is first led [s]; None where nobody leads it."""
-        if (told := self.told(subtask, "leader")) is not None:
-            t, leader = told
+        """Return the time at which a subtask is first led [s]; None if it never is."""
+        if (entry := self.energy_entry(subtask, "leader")) is not None:
+            t, leader = entry
             led = t[leader != AUTHORITIES.index("hold")]
             return float(led[0]) if len(led) else None
         topic = self.reference_topic(subtask)
@@ -232,19 +235,19 @@ class Recorded:
 
 
 def scenario_of(run: Run) -> Scenario:
-    """The scenario that a recording holds.
+    """Build the scenario of a recording.
 
     Raises:
-        RecordingError: There is none, or it is wrong.
+        RecordingError: The scenario is missing or invalid.
     """
     if run.scenario is None:
-        raise RecordingError(f"{run.path}: holds no scenario, so that it cannot be analysed")
+        raise RecordingError(f"{run.path}: no scenario: the run cannot be analysed")
     try:
         values = _parameters(yaml.safe_load(run.scenario))
         return Scenario.from_dict(_described(run, values))
     except (ScenarioError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
         reason = " ".join(str(error).split())
-        raise RecordingError(f"{run.path}: its scenario is wrong: {reason}") from error
+        raise RecordingError(f"{run.path}: invalid scenario: {reason}") from error
 
 
 def _parameters(content: Any) -> Mapping[str, Any]:
@@ -255,37 +258,37 @@ def _parameters(content: Any) -> Mapping[str, Any]:
 
 
 def _described(run: Run, values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """The same scenario with the robots' descriptions that came on topics."""
+    """Return the scenario with the robot descriptions that were received on topics."""
     described = dict(values)
     for robot, topic in description_topics(values).items():
         for message in run.messages(topic):
             described[robot] = {**described[robot], "urdf_text": message.data}
-            break  # One that comes later is refused by the programs.
+            break  # Nodes reject later descriptions.
     return described
 
 
-def _coordinates(task: Subtask, series: TrajectorySeries, linear: Array, turning: Array) -> Array:
-    """Numbers of a subtask's layout, element by element, shape (n, size) or (n, p).
+def _coordinates(task: Subtask, series: TrajectorySeries, linear: Array, angular: Array) -> Array:
+    """Return values or derivatives in a subtask's layout, shape (n, size) or (n, p).
 
     Args:
         task: The subtask.
-        series: What was recorded.
-        linear: Its translations, or their derivatives, shape (n, elements, 3).
-        turning: Its quaternions, or angular derivatives, shape (n, elements, 4 or 3).
+        series: Recorded messages.
+        linear: Translations or their derivatives, shape (n, elements, 3).
+        angular: Quaternions or angular derivatives, shape (n, elements, 4 or 3).
     """
     elements = [series.names.index(name) for name in task.elements if name in series.names]
-    width = len(task.axes) + (turning.shape[2] if task.rotates else 0)
+    width = len(task.axes) + (angular.shape[2] if task.rotates else 0)
     if len(elements) < len(task.elements):
         return np.full((len(linear), len(task.elements) * width), np.nan)
     axes = [AXES.index(axis) for axis in task.axes]
     parts = [linear[:, elements][:, :, axes]]
     if task.rotates:
-        parts.append(turning[:, elements])
+        parts.append(angular[:, elements])
     return np.concatenate(parts, axis=2).reshape(len(linear), -1)
 
 
-def common_instants(a: Array, b: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows of a and of b at which both have the same time, to the nanosecond."""
+def common_times(a: Array, b: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the rows of a and of b with equal times, to the nanosecond."""
     stamps = [np.round(values * 1e9).astype(np.int64) for values in (a, b)]
     first, second = stamps
     _, rows, others = np.intersect1d(first, second, return_indices=True)
@@ -293,7 +296,7 @@ def common_instants(a: Array, b: Array) -> tuple[NDArray[np.intp], NDArray[np.in
 
 
 def select(motion: RecordedMotion, rows: Any) -> RecordedMotion:
-    """Some instants of a motion."""
+    """Select rows of a motion."""
     return RecordedMotion(
         motion.t[rows], motion.position[rows], motion.velocity[rows], motion.acceleration[rows]
     )

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The records of an MCAP file, read in order, with a clear word where the file ends early.
+"""Sequential reader of the records of an MCAP file that detects truncated files.
 
-The `mcap` package's own readers either trust the summary at the end of the file, which a killed
-recorder never wrote, or take a short read for a whole record.
+The readers of the `mcap` package either rely on the summary at the end of the file, which a killed
+recorder never wrote, or accept a short read as a complete record.
 """
 
 import struct
@@ -32,16 +32,16 @@ DAMAGE = (
     zstandard.ZstdError,
     McapError,
 )
-"""What the `mcap` package raises on a record that holds something else than it should."""
+"""Errors that the `mcap` package raises on damaged records."""
 
 
 class EarlyEndError(RecordingError):
-    """The file stops before its end, as that of a killed recorder does.
+    """Truncated file, such as that of a killed recorder.
 
     Attributes:
         path: The file.
-        offset: First byte that belongs to no whole record.
-        found: What stands there.
+        offset: First byte after the last complete record.
+        found: Content at that offset.
     """
 
     def __init__(self, path: Path, offset: int, found: str) -> None:
@@ -53,7 +53,7 @@ class EarlyEndError(RecordingError):
 
 
 class DamagedError(RecordingError):
-    """A record's content is not what its check sum or its type promises."""
+    """Record whose content does not match its checksum or type."""
 
 
 class StoredMessage(NamedTuple):
@@ -67,7 +67,7 @@ class StoredMessage(NamedTuple):
 
 
 def read_records(path: Path) -> Iterator[tuple[int, bytes]]:
-    """Yields opcode and content of each record at the top level of a file.
+    """Yield opcode and content of each top-level record of a file.
 
     Raises:
         RecordingError: The file cannot be read, is empty, or is not MCAP.
@@ -96,7 +96,7 @@ def _read_stream(path: Path, stream: BinaryIO, size: int) -> Iterator[tuple[int,
         opcode, length = _FRAME.unpack(frame)
         if opcode == 0:
             raise EarlyEndError(path, at, "a gap (no record)")
-        # Checked before it is read: a damaged length may ask for more memory than there is.
+        # Check before reading: a damaged length may exceed the available memory.
         if length > size - at - _FRAME.size:
             raise EarlyEndError(path, at, "an incomplete record")
         yield opcode, stream.read(length)
@@ -108,15 +108,15 @@ def _read_stream(path: Path, stream: BinaryIO, size: int) -> Iterator[tuple[int,
 
 
 def open_record(body: bytes) -> ReadDataStream:
-    """A record's content as the record types of the `mcap` package read it."""
+    """Open a record's content for the record types of the `mcap` package."""
     return ReadDataStream(BytesIO(body))
 
 
 def unpack_chunk(body: bytes) -> bytes:
-    """Decompresses a chunk record.
+    """Decompress a chunk record.
 
     Raises:
-        DamagedError: Its check sum or its compression is wrong.
+        DamagedError: The checksum or the compression is wrong.
     """
     try:
         stream, size = get_chunk_data_stream(Chunk.read(open_record(body)), validate_crc=True)
@@ -126,10 +126,10 @@ def unpack_chunk(body: bytes) -> bytes:
 
 
 def read_attachment(body: bytes) -> Attachment:
-    """Reads an attachment record.
+    """Read an attachment record.
 
     Raises:
-        DamagedError: Its check sum is wrong.
+        DamagedError: The checksum is wrong.
     """
     expected = int.from_bytes(body[-4:], "little")
     if expected and zlib.crc32(body[:-4]) != expected:
@@ -138,7 +138,7 @@ def read_attachment(body: bytes) -> Attachment:
 
 
 def split_records(data: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yields opcode and content of the records inside a decompressed chunk."""
+    """Yield opcode and content of the records inside a decompressed chunk."""
     at = 0
     while at < len(data):
         opcode, length = _FRAME.unpack_from(data, at)
@@ -147,8 +147,8 @@ def split_records(data: bytes) -> Iterator[tuple[int, bytes]]:
         at += length
 
 
-def opened(opcode: int, body: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yields the records inside a chunk; any other record is yielded itself."""
+def unpacked(opcode: int, body: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield the records inside a chunk, or the record itself if it is not a chunk."""
     if opcode == Opcode.CHUNK:
         yield from split_records(unpack_chunk(body))
     else:
@@ -156,6 +156,6 @@ def opened(opcode: int, body: bytes) -> Iterator[tuple[int, bytes]]:
 
 
 def stored_message(body: bytes) -> StoredMessage:
-    """Reads a message record."""
+    """Read a message record."""
     channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(body)
     return StoredMessage(channel, sequence, log_time, publish_time, body[_MESSAGE.size :])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Repairs the file of a recorder that was killed: keeps every whole message, adds the index."""
+"""Repair of truncated or damaged recordings: keep all complete messages, rebuild the index."""
 
 import os
 from dataclasses import dataclass
@@ -19,13 +19,13 @@ from noninteract_ros.reporting.recording.writer import CHUNK_SIZE, LIBRARY, PROF
 
 @dataclass(frozen=True, slots=True)
 class RepairReport:
-    """What a repair found.
+    """Result of a repair.
 
     Attributes:
         path: The repaired file.
-        messages: How many messages it holds.
-        lost_bytes: Size of what was left out [bytes, as stored]; messages in there are lost.
-        reasons: What was wrong, one line each; empty for a file that was whole.
+        messages: Number of messages kept.
+        lost_bytes: Stored size of the skipped content [bytes]; its messages are lost.
+        reasons: Damage found, one line each; empty for an intact file.
     """
 
     path: Path
@@ -35,7 +35,7 @@ class RepairReport:
 
     @property
     def intact(self) -> bool:
-        """Whether nothing was wrong."""
+        """True if the file was intact."""
         return not self.reasons
 
     def __str__(self) -> str:
@@ -43,23 +43,22 @@ class RepairReport:
             return f"{self.path}: nothing to repair, {self.messages} messages"
         more = f"; {len(self.reasons) - 3} more" if len(self.reasons) > 3 else ""
         return (
-            f"{self.path}: kept {self.messages} messages, left out {self.lost_bytes} bytes "
+            f"{self.path}: kept {self.messages} messages, skipped {self.lost_bytes} bytes "
             f"({'; '.join(self.reasons[:3])}{more})"
         )
 
 
 def repair(path: str | Path, out: str | Path | None = None) -> RepairReport:
-    """Writes a whole file out of one that ends early or is damaged.
+    """Write a complete file from a truncated or damaged one.
 
-    The result appears at once or not at all; until then the original stays as it is.
+    The result replaces the target atomically; the original stays unchanged until then.
 
     Args:
-        path: The file, or the folder that holds it as `run.mcap`.
-        out: Where the result goes; in place of the original where None.
+        path: The file, or the folder with its `run.mcap`.
+        out: File to write; None replaces the original.
 
     Raises:
-        RecordingError: The file is missing, empty or no MCAP file, or the result cannot be
-            written.
+        RecordingError: The file is missing, empty or not MCAP, or the result cannot be written.
     """
     path = Path(path)
     source = path / FILE_NAME if path.is_dir() else path
@@ -69,10 +68,10 @@ def repair(path: str | Path, out: str | Path | None = None) -> RepairReport:
             temporary = Path(stream.name)
             try:
                 copy = _Copy(stream)
-                copy.all_of(source)
+                copy.copy_file(source)
                 stream.close()
                 if copy.reasons or target != source:
-                    # A temporary file is private; the result is as readable as the original.
+                    # Temporary files are private; restore the permissions of the original.
                     temporary.chmod(source.stat().st_mode & 0o777)
                     os.replace(temporary, target)
             finally:
@@ -83,7 +82,7 @@ def repair(path: str | Path, out: str | Path | None = None) -> RepairReport:
 
 
 class _Copy:
-    """Copies records into a new file, leaving out what is damaged."""
+    """Copy of the undamaged records of a file."""
 
     def __init__(self, stream: IO[bytes]) -> None:
         self.messages = 0
@@ -94,8 +93,8 @@ class _Copy:
         self._schemas: dict[int, int] = {0: 0}  # 0 stands for no schema
         self._channels: dict[int, int] = {}
 
-    def all_of(self, path: Path) -> None:
-        """Copies a file and finishes the result."""
+    def copy_file(self, path: Path) -> None:
+        """Copy a file and finish the result."""
         try:
             for opcode, body in records.read_records(path):
                 self._guarded(opcode, body)
@@ -107,14 +106,14 @@ class _Copy:
 
     def _guarded(self, opcode: int, body: bytes) -> None:
         try:
-            for inner, content in records.opened(opcode, body):
+            for inner, content in records.unpacked(opcode, body):
                 self._add(inner, content)
         except KeyError as error:
-            self._lose(body, f"no channel or schema {error}")
+            self._skip(body, f"no channel or schema {error}")
         except (records.DamagedError, *records.DAMAGE) as error:
-            self._lose(body, str(error))
+            self._skip(body, str(error))
 
-    def _lose(self, body: bytes, reason: str) -> None:
+    def _skip(self, body: bytes, reason: str) -> None:
         self.lost_bytes += len(body)
         self.reasons.append(reason)
 
@@ -140,7 +139,7 @@ class _Copy:
             self._add_rare(opcode, body)
 
     def _add_rare(self, opcode: int, body: bytes) -> None:
-        """Adds what is not a message; the index at the end of a file is made anew."""
+        """Add a record that is not a message; the index is rebuilt by the writer."""
         content = records.open_record(body)
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(content)

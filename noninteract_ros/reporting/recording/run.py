@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A recorded run, read back as arrays."""
+"""Reader of recorded runs."""
 
 import struct
 from collections.abc import Callable, Iterator
@@ -28,14 +28,14 @@ Series = TypeVar("Series")
 
 
 class Topic:
-    """The messages of one topic in the order of arrival.
+    """Messages of one topic in the order of arrival.
 
     Attributes:
         name: Full name.
-        schema: Name (the message type) and definition.
-        data: The serialized messages, length n.
-        log_times: When each was received, ns since 1970, length n.
-        publish_times: When each was sent, ns since 1970, length n.
+        schema: Message type and definition.
+        data: Serialized messages, length n.
+        log_times: Times of reception [ns since 1970], length n.
+        publish_times: Times of publication [ns since 1970], length n.
     """
 
     def __init__(self, name: str, schema: Schema) -> None:
@@ -48,13 +48,13 @@ class Topic:
 class Run:
     """A recorded run.
 
-    Topics are given by full name (`/team/joint_states`) or by its end (`joint_states`), as long
-    as that fits one topic only.
+    Topics are given by full name (`/team/joint_states`) or by its last part (`joint_states`) if
+    that is unique.
 
     Attributes:
         path: The file.
-        scenario: The scenario it was recorded with (YAML); None where it holds none.
-        topics: Message type of each topic that has messages.
+        scenario: Scenario of the run (YAML); None if the file has none.
+        topics: Message type of each topic with messages.
     """
 
     def __init__(self, path: Path, scenario: str | None, topics: list[Topic]) -> None:
@@ -64,18 +64,18 @@ class Run:
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
-        """Reads a recording.
+        """Read a recording.
 
         Args:
-            path: The file, or the folder that holds it as `run.mcap`.
+            path: The file, or the folder with its `run.mcap`.
 
         Raises:
-            RecordingError: It is missing, empty, no MCAP file, damaged, or was not finished.
+            RecordingError: The file is missing, empty, not MCAP, damaged or truncated.
         """
         path = Path(path)
         file = path / FILE_NAME if path.is_dir() else path
         if path.is_dir() and not file.exists():
-            raise RecordingError(f"{path}: is no run: the folder holds no {FILE_NAME}")
+            raise RecordingError(f"{path}: no {FILE_NAME} in this folder")
         loader = _Loader(file)
         for opcode, body in records.read_records(file):
             loader.add(opcode, body)
@@ -84,7 +84,7 @@ class Run:
         )
 
     def joints(self, topic: str) -> series.JointSeries:
-        """Joint states or commands.
+        """Return joint states or commands.
 
         Raises:
             RecordingError: The topic is missing, of another type, or holds a malformed message.
@@ -92,7 +92,7 @@ class Run:
         return self._decode(topic, JOINT_STATE, lambda found: series.joint_series(found.data))
 
     def trajectory(self, topic: str) -> series.TrajectorySeries:
-        """A subtask's state, desired value or reference.
+        """Return states, desired values or references of a subtask.
 
         Raises:
             RecordingError: The topic is missing, of another type, or holds a malformed message.
@@ -100,7 +100,7 @@ class Run:
         return self._decode(topic, TRAJECTORY, lambda found: series.trajectory_series(found.data))
 
     def wrench(self, topic: str) -> series.WrenchSeries:
-        """Wrenches.
+        """Return wrenches.
 
         Raises:
             RecordingError: The topic is missing, of another type, or holds a malformed message.
@@ -108,7 +108,7 @@ class Run:
         return self._decode(topic, WRENCH, lambda found: series.wrench_series(found.data))
 
     def labelled(self, topic: str) -> series.LabelledSeries:
-        """Labelled numbers, such as a subtask's energies.
+        """Return labelled numbers, such as the energies of a subtask.
 
         Raises:
             RecordingError: The topic is missing, of another type, or holds a malformed message.
@@ -121,7 +121,7 @@ class Run:
         return self._decode(topic, LABELLED, read)
 
     def diagnostics(self, topic: str = "/diagnostics") -> list[dict[str, Any]]:
-        """Every status in the order of arrival: stamp [s], name, level, message, values.
+        """Return all statuses in the order of arrival: stamp [s], name, level, message, values.
 
         Raises:
             RecordingError: The topic is missing, of another type, or holds a malformed message.
@@ -141,7 +141,7 @@ class Run:
         ]
 
     def messages(self, topic: str) -> Iterator[Any]:
-        """Decodes the messages of any topic one by one, into objects with the fields' names.
+        """Decode the messages of a topic one by one, into objects with the fields of the type.
 
         Raises:
             RecordingError: The topic is missing or holds a malformed message.
@@ -150,7 +150,7 @@ class Run:
         decode = DecoderFactory().decoder_for("cdr", found.schema)
         if decode is None:
             raise RecordingError(
-                f"{self.path}: {found.name}: no way to decode {found.schema.encoding!r}"
+                f"{self.path}: {found.name}: unknown encoding {found.schema.encoding!r}"
             )
         for index, data in enumerate(found.data):
             try:
@@ -161,7 +161,7 @@ class Run:
                 ) from error
 
     def log_times(self, topic: str) -> NDArray[np.int64]:
-        """When each message of a topic was received, ns since 1970, shape (n,).
+        """Return the times of reception of a topic [ns since 1970], shape (n,).
 
         Raises:
             RecordingError: The topic is missing.
@@ -169,7 +169,7 @@ class Run:
         return np.array(self._find(topic).log_times, dtype=np.int64)
 
     def publish_times(self, topic: str) -> NDArray[np.int64]:
-        """When each message of a topic was sent, ns since 1970, shape (n,).
+        """Return the times of publication of a topic [ns since 1970], shape (n,).
 
         Raises:
             RecordingError: The topic is missing.
@@ -195,20 +195,20 @@ class Run:
         if name in self._topics:
             return self._topics[name]
         fitting = [full for full in self._topics if full.endswith(f"/{name.lstrip('/')}")]
-        # The team's own topics lie above those of its robots.
+        # Topics of the team have precedence over those of its robots.
         highest = min((full.count("/") for full in fitting), default=0)
         fitting = [full for full in fitting if full.count("/") == highest]
         if len(fitting) == 1 and not name.startswith("/"):
             return self._topics[fitting[0]]
-        trouble = "fits several topics" if len(fitting) > 1 else "is not in the recording"
+        problem = "matches several topics" if len(fitting) > 1 else "is not in the recording"
         raise RecordingError(
-            f"{self.path}: topic {name} {trouble}, allowed: "
+            f"{self.path}: topic {name} {problem}, allowed: "
             f"{one_of(fitting if len(fitting) > 1 else self._topics, name)}"
         )
 
 
 class _Loader:
-    """Collects the messages of a file by topic."""
+    """Messages of a file by topic."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -218,13 +218,13 @@ class _Loader:
         self._channels: dict[int, Topic] = {}
 
     def add(self, opcode: int, body: bytes) -> None:
-        """Takes one record.
+        """Add one record.
 
         Raises:
-            RecordingError: It is damaged.
+            RecordingError: The record is damaged.
         """
         try:
-            for inner, content in records.opened(opcode, body):
+            for inner, content in records.unpacked(opcode, body):
                 self._add(inner, content)
         except (records.DamagedError, KeyError, *records.DAMAGE) as error:
             raise RecordingError(

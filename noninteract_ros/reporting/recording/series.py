@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded messages of one topic as arrays over time.
 
-In all series: stamps are in seconds and each stands once (of messages with the same stamp, such
-as a state that was sent again, the first is kept); rows are in the order of arrival. Names that
-come and go between messages all have a column, NaN where a message lacks it. A field whose size
-does not fit the names is NaN as well: it was refused by whoever read it.
+Conventions of all series: stamps are in seconds and unique; of messages with equal stamps, such as
+a state that was published again, the first is kept. Rows are in the order of arrival. Each name
+that occurs in any message has a column, NaN where a message lacks it. A field whose size does not
+match the names is NaN as well: subscribers reject it.
 """
 
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class JointSeries:
 
 @dataclass(frozen=True, slots=True)
 class TrajectorySeries:
-    """Values of a subtask (state, desired or reference), in SI units.
+    """Motion of a subtask (state, desired or reference), in SI units.
 
     Attributes:
         names: The subtask's elements.
@@ -52,8 +52,8 @@ class TrajectorySeries:
         linear_acceleration: Shape (n, elements, 3).
         angular_acceleration: Shape (n, elements, 3).
         markers: Stamps of the messages without points, shape (m,).
-        contradicted: Stamps at which messages tell different things, shape (k,). A message that
-            only repeats another one, byte by byte, contradicts nothing.
+        conflicting: Stamps of messages with different content, shape (k,). A message that repeats
+            another one byte by byte is no conflict.
     """
 
     names: tuple[str, ...]
@@ -65,7 +65,7 @@ class TrajectorySeries:
     linear_acceleration: Array
     angular_acceleration: Array
     markers: Array
-    contradicted: Array
+    conflicting: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ class WrenchSeries:
 
     Attributes:
         stamps: Shape (n,).
-        frames: `header.frame_id` of each, length n.
+        frames: `header.frame_id` of each message, length n.
         force: [N], shape (n, 3).
         torque: [N m], shape (n, 3).
     """
@@ -90,9 +90,9 @@ class LabelledSeries:
     """Labelled numbers, such as the energies of a subtask.
 
     Attributes:
-        labels: What each column is.
-        stamps: The entry `time`, or when the message was sent (seconds since 1970) where there
-            is none; shape (n,).
+        labels: Label of each column.
+        stamps: Entry `time`, or the time of publication [s since 1970] without such an entry;
+            shape (n,).
         data: Shape (n, labels).
     """
 
@@ -101,7 +101,7 @@ class LabelledSeries:
     data: Array
 
     def __getitem__(self, label: str) -> Array:
-        """One column, shape (n,).
+        """Return one column, shape (n,).
 
         Raises:
             KeyError: There is no such label.
@@ -112,7 +112,7 @@ class LabelledSeries:
 
 
 def joint_series(messages: list[bytes]) -> JointSeries:
-    """Decodes sensor_msgs/msg/JointState messages.
+    """Decode sensor_msgs/msg/JointState messages.
 
     Raises:
         InputError: A message is malformed.
@@ -124,7 +124,7 @@ def joint_series(messages: list[bytes]) -> JointSeries:
 
 
 def trajectory_series(messages: list[bytes]) -> TrajectorySeries:
-    """Decodes trajectory_msgs/msg/MultiDOFJointTrajectory messages.
+    """Decode trajectory_msgs/msg/MultiDOFJointTrajectory messages.
 
     Raises:
         InputError: A message is malformed.
@@ -150,12 +150,12 @@ def trajectory_series(messages: list[bytes]) -> TrajectorySeries:
         linear_acceleration=accelerations[..., :3],
         angular_acceleration=accelerations[..., 3:],
         markers=markers[_first_of_each(markers)],
-        contradicted=_contradicted(messages, table.stamps),
+        conflicting=_contradicted(messages, table.stamps),
     )
 
 
 def wrench_series(messages: list[bytes]) -> WrenchSeries:
-    """Decodes geometry_msgs/msg/WrenchStamped messages.
+    """Decode geometry_msgs/msg/WrenchStamped messages.
 
     Raises:
         InputError: A message is malformed.
@@ -172,11 +172,11 @@ def wrench_series(messages: list[bytes]) -> WrenchSeries:
 
 
 def labelled_series(messages: list[bytes], publish_times: Array) -> LabelledSeries:
-    """Decodes std_msgs/msg/Float64MultiArray messages whose entries are labelled.
+    """Decode std_msgs/msg/Float64MultiArray messages with labelled entries.
 
     Args:
-        messages: The serialized messages.
-        publish_times: When each was sent [s], shape (n,).
+        messages: Serialized messages.
+        publish_times: Times of publication [s], shape (n,).
 
     Raises:
         InputError: A message is malformed.
@@ -193,7 +193,7 @@ def labelled_series(messages: list[bytes], publish_times: Array) -> LabelledSeri
 
 
 class _Table:
-    """Messages grouped by layout, with one column for each name that occurs."""
+    """Messages grouped by layout, with one column for each name."""
 
     def __init__(self, messages: list[bytes], walker: layouts.Walker) -> None:
         self.groups = layouts.group_by_layout(messages, walker)
@@ -209,7 +209,7 @@ class _Table:
                 self.stamps[group.rows] = group.stamps()
 
     def field(self, key: str, size: int) -> Array:
-        """A field with `size` numbers for each name, shape (messages, names, size)."""
+        """Return a field with `size` numbers for each name, shape (messages, names, size)."""
         values = np.full((self._rows, len(self.names), size), np.nan)
         for group in self.groups:
             names, block = group.layout.names, group.layout.blocks.get(key)
@@ -222,13 +222,13 @@ class _Table:
 
 
 def _first_of_each(stamps: Array) -> NDArray[np.intp]:
-    """Rows, in order, that are the first with their stamp."""
+    """Return the first row of each stamp, in order."""
     _, first = np.unique(stamps, return_index=True)
     return np.sort(first)
 
 
 def _contradicted(messages: list[bytes], stamps: Array) -> Array:
-    """Stamps that different messages have, shape (k,)."""
-    told = set(zip(stamps.tolist(), messages, strict=True))
-    values, counts = np.unique([stamp for stamp, _ in told], return_counts=True)
+    """Return the stamps shared by messages with different content, shape (k,)."""
+    distinct = set(zip(stamps.tolist(), messages, strict=True))
+    values, counts = np.unique([stamp for stamp, _ in distinct], return_counts=True)
     return np.asarray(values[counts > 1], dtype=np.float64)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Writes a run to an MCAP file that survives the death of its writer."""
+"""Crash-tolerant MCAP writer for runs."""
 
 from pathlib import Path
 from types import TracebackType
@@ -13,30 +13,30 @@ from noninteract_ros.reporting.recording.definitions import definition
 PROFILE = "ros2"
 LIBRARY = "noninteract_ros"
 SCENARIO = "scenario.yaml"
-CHUNK_SIZE = 64 * 1024  # bytes; what a killed recorder can lose at most
+CHUNK_SIZE = 64 * 1024  # bytes; largest loss of a killed recorder
 
 
 class RunWriter:
-    """Writes serialized messages, with their definitions, into `run.mcap`.
+    """Writer of serialized messages and their definitions into an MCAP file.
 
-    The scenario stands at the start of the file, and each chunk goes to the operating system as
-    soon as it is full: of a recorder that is killed, `repair` loses one chunk at most.
+    The scenario is stored at the start of the file. Each full chunk is passed to the operating
+    system at once: after a crash, `repair` loses one chunk at most.
 
     Attributes:
         path: The file.
-        messages: How many messages were added.
-        size: Their serialized size [bytes].
+        messages: Number of messages added.
+        size: Serialized size of these messages [bytes].
     """
 
     def __init__(
         self, path: str | Path, scenario_text: str | None, overwrite: bool = False
     ) -> None:
-        """Creates the file and, where needed, its folder.
+        """Create the file and its folder.
 
         Args:
             path: File to create.
-            scenario_text: The scenario (YAML) of the run, kept as attachment `scenario.yaml`.
-            overwrite: Whether a file that exists is replaced.
+            scenario_text: Scenario of the run (YAML), stored as attachment `scenario.yaml`.
+            overwrite: True to replace an existing file.
 
         Raises:
             RecordingError: The file exists, or cannot be written.
@@ -48,7 +48,7 @@ class RunWriter:
         self._schemas: dict[str, int] = {}
         self._unflushed = 0
         if self.path.exists() and not overwrite:
-            raise RecordingError(f"{self.path}: exists and is not overwritten")
+            raise RecordingError(f"{self.path}: file exists")
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._stream = self.path.open("wb" if overwrite else "xb")
@@ -68,7 +68,7 @@ class RunWriter:
 
     @property
     def topics(self) -> int:
-        """How many topics have at least one message."""
+        """Number of topics with at least one message."""
         return len({topic for topic, _ in self._channels})
 
     def add(
@@ -80,24 +80,24 @@ class RunWriter:
         cdr_bytes: bytes,
         sequence: int = 0,
     ) -> None:
-        """Adds one message.
+        """Add one message.
 
         Args:
-            topic: Full name.
+            topic: Full name of the topic.
             type_name: E.g. `sensor_msgs/msg/JointState`.
-            log_time_ns: When it was received, in ns since 1970.
-            publish_time_ns: When it was sent, in ns since 1970.
-            cdr_bytes: The serialized message, with its encapsulation header.
-            sequence: The publisher's number of the message, 0 where unknown.
+            log_time_ns: Time of reception [ns since 1970].
+            publish_time_ns: Time of publication [ns since 1970].
+            cdr_bytes: Serialized message with its encapsulation header.
+            sequence: Sequence number of the publisher, 0 if unknown.
 
         Raises:
-            RecordingError: The type has no definition here, or the file cannot be written.
+            RecordingError: The type is not installed, or the file cannot be written.
         """
         channel = self._channels.get((topic, type_name))
         if channel is None:
             channel = self._register(topic, type_name)
         try:
-            # MCAP has 32 bits for the number; a publisher may count further.
+            # MCAP stores 32 bits of the sequence number.
             self._writer.add_message(
                 channel, log_time_ns, cdr_bytes, publish_time_ns, sequence & 0xFFFFFFFF
             )
@@ -111,7 +111,7 @@ class RunWriter:
         self.size += len(cdr_bytes)
 
     def flush(self) -> None:
-        """Hands all messages so far to the operating system, in a chunk of their own.
+        """Pass all messages so far to the operating system, in a chunk of their own.
 
         Raises:
             RecordingError: The file cannot be written.
@@ -122,7 +122,7 @@ class RunWriter:
             raise self._abandon(error) from error
 
     def close(self) -> None:
-        """Finishes the file; a second call does nothing.
+        """Finish the file; further calls have no effect.
 
         Raises:
             RecordingError: The file cannot be written.
@@ -159,12 +159,11 @@ class RunWriter:
         return channel
 
     def _abandon(self, error: OSError) -> RecordingError:
-        """Gives the file up as it is: what reached the disk can be repaired."""
+        """Close the file as it is; its content on disk can be repaired."""
         try:
             self._stream.close()
         except OSError:
-            # Closing flushes once more, and fails for the reason that is being reported; the
-            # second call then closes without a flush.
+            # Closing flushes again and fails for the same reason; `raw` closes without a flush.
             self._stream.raw.close()
         return self._failure(error)
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Metrics that compare a recording with other runs of the same scenario."""
+"""Comparison of a recording with rehearsals of its scenario."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recording against rehearsals: the same run again, without a source, under another law."""
+"""Comparison with rehearsals: the same run, without one source, and under other laws."""
 
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -11,42 +11,44 @@ from numpy.typing import NDArray
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.law.decoupling import DECOUPLING_LAWS
 from noninteract_ros.reporting.checks.checks import Check, at_most, not_applicable
-from noninteract_ros.reporting.metrics.holding import (
-    Holding,
-    deflection,
-    holding_force,
-    impedance_of,
-    recorded_holding,
-    told_rows,
-)
 from noninteract_ros.reporting.metrics.influences import Influence
+from noninteract_ros.reporting.metrics.zero_order_hold import (
+    HoldForce,
+    deflection,
+    hold_force,
+    impedance_of,
+    recorded_hold_force,
+    telemetry_rows,
+)
 from noninteract_ros.reporting.recording.recorded import FRICTION, Recorded
 from noninteract_ros.reporting.rehearsed.rehearsals import (
     Joints,
     Variant,
-    owned_subtasks,
+    led_subtasks,
     rehearse_all,
-    starts,
+    source_starts,
 )
 
-# [m; rad] How far a source may move a subtask that is not its own. On inertias that vary with
-# where the team is, holding the torque over a tick moves it by `holding.deflection` more.
-MOVED = 1e-9
-SAME = 1e-12  # [m, m/s; rad, rad/s] the same arithmetic on another processor may round differently
-# (29) keeps a subtask on its reference whatever others do; how it comes back is another thing.
-OFF = "a subtask is off its reference, and its inertia depends on where the others are"
-WINDOW = 2.0  # [s] that rehearsals without a source go on after it has begun
-SHORTEST = 2000  # ticks of a rehearsal for its own sake
-BUDGET = 400_000  # coordinates times ticks that one rehearsal may take
+# [m; rad] Allowed motion of a subtask by another subtask's source. On configuration-dependent
+# inertias the zero-order hold adds `zero_order_hold.deflection`.
+TOLERANCE = 1e-9
+REPRODUCTION_TOLERANCE = (
+    1e-12  # [m, m/s; rad, rad/s] the same arithmetic on another processor may round differently
+)
+# (29) keeps a subtask on its reference; its return to the reference depends on its inertia.
+OFF_REFERENCE = "a subtask is off its reference, and its inertia depends on where the others are"
+WINDOW = 2.0  # [s] duration of rehearsals without a source after its start
+MIN_TICKS = 2000  # ticks of rehearsals without sources
+MAX_COORDINATE_TICKS = 400_000  # largest coordinates times ticks of one rehearsal
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What the rehearsals showed.
+    """Results of the rehearsals.
 
     Attributes:
-        metrics: The sections `reproduction`, `noninteraction` and `comparison`.
-        checks: Their checks.
+        metrics: Sections `reproduction`, `noninteraction` and `comparison`.
+        checks: Checks of these sections.
     """
 
     metrics: dict[str, Any]
@@ -54,41 +56,41 @@ class Comparison:
 
 
 class Comparer:
-    """Runs the rehearsals that a recording needs, once each.
+    """Comparison of a recording with rehearsals, each run once.
 
     Args:
         recorded: The recording.
-        outside: What acted on it that its scenario does not foresee.
-        other_laws: Whether the scenario is rehearsed under other laws as well.
+        external: External influences that are not part of the scenario.
+        other_laws: True to rehearse the scenario under other laws as well.
     """
 
     def __init__(
-        self, recorded: Recorded, outside: list[Influence], other_laws: bool = True
+        self, recorded: Recorded, external: list[Influence], other_laws: bool = True
     ) -> None:
-        self._recorded, self._outside = recorded, outside
+        self._recorded, self._external = recorded, external
         self._law = recorded.scenario.general.law
-        self._owned = owned_subtasks(recorded.scenario)
+        self._owned = led_subtasks(recorded.scenario)
         self._laws = [self._law, *(_others(recorded, self._law) if other_laws else ())]
         last = int(recorded.ticks[-1]) + 1 if recorded.lockstep else _planned_ticks(recorded)
-        self._whole = min(last, BUDGET // recorded.team.n)
-        # What a source moves shows soon; rehearsals without it need not go on for longer.
-        self._sides = {
+        self._whole = min(last, MAX_COORDINATE_TICKS // recorded.team.n)
+        # The effect of a source appears soon after its start.
+        self._source_ticks = {
             source: min(self._whole, round((start + WINDOW) * recorded.rate) + 1)
-            for source, start in starts(recorded.scenario).items()
+            for source, start in source_starts(recorded.scenario).items()
             if source in self._owned
         }
-        self._longest = max(self._sides.values(), default=min(self._whole, SHORTEST))
+        self._longest = max(self._source_ticks.values(), default=min(self._whole, MIN_TICKS))
         self._results: dict[Variant, Joints] = {}
 
     def compare(self) -> Comparison:
-        """All of it."""
+        """Run all rehearsals and return their metrics and checks."""
         self._rehearse()
         reproduction, check = self._reproduction()
         noninteraction, checks = self._noninteraction()
         metrics = {
             "reproduction": reproduction,
             "noninteraction": noninteraction,
-            "comparison": self._crossings(),
+            "comparison": self._cross_motion(),
         }
         return Comparison(metrics, [check, *checks])
 
@@ -96,24 +98,26 @@ class Comparer:
         return Variant(law, human=source != "human", autonomy=source != "autonomy")
 
     def _rehearse(self) -> None:
-        # The whole run serves the reproduction only.
-        ticks = self._longest if self._incomparable("*") else self._whole
+        # Only the reproduction needs the whole run.
+        ticks = self._longest if self._incomparable_reason("*") else self._whole
         jobs = [(Variant(self._law), ticks)]
         for law in self._laws:
-            jobs += [(self._without(law, source), side) for source, side in self._sides.items()]
+            jobs += [
+                (self._without(law, source), side) for source, side in self._source_ticks.items()
+            ]
             if law != self._law and self._owned:
                 jobs.append((Variant(law), self._longest))
         results = rehearse_all(self._recorded.scenario, jobs)
         self._results = {job[0]: result for job, result in zip(jobs, results, strict=True)}
 
     def _reproduction(self) -> tuple[dict[str, Any], Check]:
-        """The nodes add nothing: the recorded joint states are those of a rehearsal."""
+        """Check that the recorded joint states equal those of a rehearsal without ROS."""
         name, recorded = "reproduction", self._recorded
-        reason = self._incomparable("*")
+        reason = self._incomparable_reason("*")
         units = sorted(set(recorded.team.units))
         unit = ", ".join([*units, *(f"{unit}/s" for unit in units)])
         if reason:
-            return {"reason": reason}, not_applicable(name, SAME, unit, reason)
+            return {"reason": reason}, not_applicable(name, REPRODUCTION_TOLERANCE, unit, reason)
         joints = self._results[Variant(self._law)]
         rows = recorded.ticks < len(joints.q)
         ticks = recorded.ticks[rows]
@@ -126,10 +130,10 @@ class Comparer:
             "unit": unit,
             "bit_equal": largest == 0.0,
         }
-        return metrics, at_most(name, largest, SAME, unit)
+        return metrics, at_most(name, largest, REPRODUCTION_TOLERANCE, unit)
 
     def _noninteraction(self) -> tuple[dict[str, Any], list[Check]]:
-        """Each source moves no subtask but its own."""
+        """Check that each source moves only its own subtask."""
         metrics: dict[str, Any] = {}
         checks = []
         for source, owned in self._owned.items():
@@ -137,7 +141,7 @@ class Comparer:
             others = np.ones(self._recorded.team.n, dtype=bool)
             others[self._recorded.part(owned)] = False
             seconds = self._seconds(len(without.q))
-            reason, moved, limits = self._moved_against(without, owned, others)
+            reason, moved, limits = self._compare_without(without, owned, others)
             if not reason and not moved[~others].max() > 0.0:
                 reason = f"{source} did not move {owned} within {seconds:g} s"
             metrics[f"without_{source}"] = {
@@ -149,65 +153,69 @@ class Comparer:
             name = f"noninteraction.{source}"
             if reason:
                 units = sorted(set(np.array(self._units)[others].tolist()))
-                checks.append(not_applicable(name, MOVED, ", ".join(units), reason))
+                checks.append(not_applicable(name, TOLERANCE, ", ".join(units), reason))
                 continue
             worst = int(np.argmax(np.where(others, moved / limits, -1.0)))
             unit = self._units[worst]
             checks.append(at_most(name, moved[worst], float(limits[worst]), unit))
         return metrics, checks
 
-    def _moved_against(
+    def _compare_without(
         self, without: Joints, owned: str, others: NDArray[np.bool_]
     ) -> tuple[str, Array, Array]:
-        """Why nothing can be told, or ""; how far coordinates moved, and how far they may."""
+        """Return the reason why the check does not apply, motions and limits, shape (n,) each."""
         nothing = np.zeros(self._recorded.team.n)
         if self._law not in DECOUPLING_LAWS:
-            return f"law {self._law} lets motions cross over", nothing, nothing
+            return f"law {self._law} does not decouple", nothing, nothing
         alone_in_it = "" if others.any() else "there is no other subtask"
-        if reason := self._incomparable(owned) or self._carried_over(without) or alone_in_it:
+        if (
+            reason := self._incomparable_reason(owned)
+            or self._coupling_reason(without)
+            or alone_in_it
+        ):
             return reason, nothing, nothing
-        difference, alone = self._held_apart(without)
-        off = np.abs(without.error).max(axis=0) > MOVED + alone
+        difference, alone = self._hold_deflections(without)
+        off = np.abs(without.error).max(axis=0) > TOLERANCE + alone
         if not self._recorded.constant and (off & others).any():
-            return OFF, nothing, nothing
-        return "", self._moved_by(without), MOVED + difference
+            return OFF_REFERENCE, nothing, nothing
+        return "", self._moved_by(without), TOLERANCE + difference
 
     @property
     def _units(self) -> tuple[str, ...]:
-        """Unit of each coordinate of all subtasks, shape (n,)."""
+        """Unit of each subtask coordinate, length n."""
         return tuple(unit for task in self._recorded.stack.subtasks for unit in task.units)
 
-    def _carried_over(self, without: Joints) -> str:
-        """Why subtasks move each other whatever the law does, or an empty text."""
+    def _coupling_reason(self, without: Joints) -> str:
+        """Return the reason why subtasks are coupled under any law, or an empty text."""
         scenario = self._recorded.scenario
         if scenario.surroundings:
-            return f"{', '.join(scenario.surroundings)} carries motions over"
+            return f"coupled by {', '.join(scenario.surroundings)}"
         if scenario.pushes and not self._recorded.constant:
-            return "what a push does depends on where the team is"
+            return "the effect of a push depends on the configuration"
         if self._recorded.team.friction.any():
             return FRICTION
         if ticks := self._recorded.interventions(self._seconds(len(without.q))):
             return (
-                f"singularities, limits of joints or energy changed the torques of {ticks} ticks"
+                f"singularities, joint limits or energy gates changed the torque in {ticks} ticks"
             )
         return ""
 
-    def _held_apart(self, without: Joints) -> tuple[Array, Array]:
-        """What holding the torque can do, shape (n,) each.
+    def _hold_deflections(self, without: Joints) -> tuple[Array, Array]:
+        """Return largest deflections by the hold force, shape (n,) each [m; rad].
 
-        How far it can lead the recording and a rehearsal apart, and the rehearsal itself away
-        from its references.
+        The first is between recording and rehearsal, the second of the rehearsal from its
+        references.
         """
         recorded = self._recorded
         if recorded.constant:
             return np.zeros(recorded.team.n), np.zeros(recorded.team.n)
-        rows = told_rows(recorded, min(len(without.q), len(recorded.ticks)))
+        rows = telemetry_rows(recorded, min(len(without.q), len(recorded.ticks)))
         rows = rows[recorded.ticks[rows] < len(without.q)]
         ticks = recorded.ticks[rows]
-        force = self._holding.force[: len(rows)]
+        force = self._hold.force[: len(rows)]
         changes = np.zeros_like(without.v)
         changes[1:-1] = np.diff(without.torque[1:], axis=0)
-        alone = holding_force(recorded, without.q[ticks], without.v[ticks], changes[ticks])
+        alone = hold_force(recorded, without.q[ticks], without.v[ticks], changes[ticks])
         impedance, seconds = impedance_of(recorded), self._seconds(len(without.q))
         return (
             deflection(impedance, force - alone, seconds),
@@ -215,11 +223,11 @@ class Comparer:
         )
 
     @cached_property
-    def _holding(self) -> Holding:
-        return recorded_holding(self._recorded)
+    def _hold(self) -> HoldForce:
+        return recorded_hold_force(self._recorded)
 
-    def _crossings(self) -> dict[str, Any]:
-        """How far each source moves each subtask, by law, in rehearsals."""
+    def _cross_motion(self) -> dict[str, Any]:
+        """Return the motion of each subtask caused by each source, by law, in rehearsals."""
         laws: dict[str, Any] = {}
         for law in self._laws:
             full = self._results[Variant(law)] if self._owned else None
@@ -229,10 +237,12 @@ class Comparer:
                 if full is not None
             }
         return {
-            "compared_s": {source: self._seconds(ticks) for source, ticks in self._sides.items()},
+            "compared_s": {
+                source: self._seconds(ticks) for source, ticks in self._source_ticks.items()
+            },
             "led_by": dict(self._owned),
             "moved": laws,
-            "note": "paper is the same law as noninteracting on constant inertias"
+            "note": "laws paper and noninteracting are equal on constant inertias"
             if self._recorded.constant
             else None,
         }
@@ -241,7 +251,7 @@ class Comparer:
         return (ticks - 1) / self._recorded.rate
 
     def _moved_by(self, without: Joints) -> Array:
-        """Largest distance of the recording from a rehearsal, shape (n,) [m; rad]."""
+        """Return the largest distance of the recording from a rehearsal, shape (n,) [m; rad]."""
         recorded = self._recorded
         rows = recorded.ticks < len(without.q)
         ticks = recorded.ticks[rows]
@@ -249,18 +259,18 @@ class Comparer:
         return self._apart(recorded.values[0][rows], values)
 
     def _moved(self, a: Joints, b: Joints) -> dict[str, dict[str, float]]:
-        """Largest distance between two runs in each subtask, while both last [m; rad]."""
+        """Return the largest distance between two rehearsals in each subtask [m; rad]."""
         count = min(len(a.q), len(b.q))
         values = [self._recorded.task_values(run.q[:count], run.v[:count])[0] for run in (a, b)]
         return self._by_subtask(self._apart(*values))
 
     def _apart(self, a: Array, b: Array) -> Array:
-        """Largest error of values a towards values b, both of shape (m, size), shape (n,)."""
+        """Return the largest difference of values a and b, both (m, size), shape (n,)."""
         apart = np.abs(self._recorded.stack.difference(a, b)).max(axis=0, initial=0.0)
         return np.where(np.isfinite(apart), apart, np.inf)
 
     def _by_subtask(self, numbers: Array) -> dict[str, dict[str, float]]:
-        """Largest of each subtask's numbers by unit, of shape (n,)."""
+        """Return the largest of the numbers (n,) of each subtask by unit."""
         stack, units = self._recorded.stack, np.array(self._units)
         found: dict[str, dict[str, float]] = {}
         for name, part in zip(stack.names, stack.slices, strict=True):
@@ -270,16 +280,16 @@ class Comparer:
             }
         return found
 
-    def _incomparable(self, ignored: str) -> str:
-        """Why the recording is not what its scenario alone gives, inputs to one subtask aside."""
+    def _incomparable_reason(self, ignored: str) -> str:
+        """Return the reason why the run differs from its scenario, one subtask's inputs aside."""
         if not self._recorded.lockstep:
-            return "wall time: every run is another one"
-        texts = [item.text for item in self._outside if item.subtask != ignored]
-        return f"not in the scenario: {'; '.join(texts)}" if texts else ""
+            return "wall time: runs are not reproducible"
+        texts = [item.text for item in self._external if item.subtask != ignored]
+        return f"external influence: {'; '.join(texts)}" if texts else ""
 
 
 def _others(recorded: Recorded, law: str) -> list[str]:
-    """Laws to compare with; what `energy_gated` is with open gates would tell nothing new."""
+    """Return laws to compare with, except laws equal to the own one with open gates."""
     laws = ["noninteracting", "natural"] + ([] if recorded.constant else ["paper"])
     alike = law == "energy_gated" or (recorded.constant and law == "paper")
     same = {law, "noninteracting"} if alike else {law}
@@ -291,7 +301,7 @@ def _planned_ticks(recorded: Recorded) -> int:
 
 
 def _largest(values: Array) -> float:
-    """Largest magnitude; infinite where something is not a number."""
+    """Return the largest magnitude; infinity if any value is NaN."""
     if not values.size:
         return 0.0
     largest = float(np.abs(values).max())

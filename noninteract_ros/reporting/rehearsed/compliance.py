@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What decoupling is good for: the same motion under other control, errors side by side.
+"""Comparison of tracking errors under all laws and under compliance control.
 
-Plain compliance control is no law of this package. It serves for comparison only: the impedance
-of each subtask is mapped to the joints by J', gravity is compensated, and nothing else is known of
-the dynamics,
+Plain compliance control is a baseline, not a law of this package. The impedance of each subtask is
+mapped to the joints by J' and gravity is compensated; the dynamics are otherwise unknown,
 
     tau = J' (-D e_rate - h(e)) + g
 
-It, and the law `natural`, meet the inertia Lambda of all subtasks together where the
-noninteracting law meets M_i. Damping that suits M_i can be too much for a light wrist in Lambda:
-held over a tick it overturns the wrist's velocity once an eigenvalue of Lambda^-1 D exceeds two in
-a tick. For a fair comparison, whatever the gains, both therefore run with damping of their own,
-critical in every mode of K and Lambda (double diagonalisation),
+Compliance control and the law `natural` act on the inertia Lambda of all subtasks, the
+noninteracting law on M_i. Damping designed for M_i can be too large for a light wrist in Lambda:
+the sampled loop is unstable once an eigenvalue of Lambda^-1 D times the tick exceeds two. For a
+fair comparison with any gains, both baselines use damping of their own, critical in every mode of
+K and Lambda (double diagonalization),
 
     K V = Lambda V diag(w^2),    V' Lambda V = 1,    D = Lambda V diag(2 w) V' Lambda
 """
@@ -32,24 +31,24 @@ from noninteract_ros.scenario.rehearsal import Rehearsal
 
 COMPLIANCE = "compliance, own damping"
 NATURAL = "natural, own damping"
-STABLE = 2.0  # damping per tick
-RATES = (0.5, 1.0, 2.0)  # of the scenario's, at which its law runs
+STABLE = 2.0  # largest damping per tick of a stable sampled loop
+RATES = (0.5, 1.0, 2.0)  # rates of the comparison relative to the scenario's
 
 
 @dataclass(frozen=True)
-class Errors:
+class PeakErrors:
     """Largest errors of one run.
 
     Attributes:
-        law: What led it.
-        rate: Ticks per second [Hz].
+        law: Law or baseline.
+        rate: Control rate [Hz].
         position: Largest error of a coordinate of each subtask that has positions [m].
         angle: Largest error of each subtask that has rotations or angles [rad].
         speed: Largest speed of an element of the desired motions [m/s].
         turning: Largest angular speed of the desired motions [rad/s].
-        damping_per_tick: Largest eigenvalue of inertia^-1 D at the start, times the tick; a loop
-            that is sampled is stable below about 2.
-        intervened: Whether a limit of the joints or a singularity took part.
+        damping_per_tick: Largest eigenvalue of inertia^-1 D at the start, times the tick; sampled
+            loops are stable below about 2.
+        intervened: True if a joint limit or a singularity changed the torque.
     """
 
     law: str
@@ -63,10 +62,10 @@ class Errors:
 
 
 class ComplianceRehearsal(Rehearsal):
-    """A rehearsal whose team gets the torque of plain compliance control."""
+    """Rehearsal with the torque of plain compliance control."""
 
     def command(self, tick: Tick) -> Array:
-        """J' (-D e_rate - h(e)) + g at a tick, shape (n,) [N or N m]."""
+        """Return J' (-D e_rate - h(e)) + g at a tick, shape (n,) [N or N m]."""
         impedance, error = self.controller.mode.impedance, tick.error
         damping = critical_damping(task_inertia(tick), impedance.stiffness)
         force = -damping @ error.e_rate - impedance.force(error.e)
@@ -74,47 +73,47 @@ class ComplianceRehearsal(Rehearsal):
 
 
 class NaturalRehearsal(Rehearsal):
-    """A rehearsal under the law `natural`, with damping that is made for its inertia."""
+    """Rehearsal under the law `natural`, with critical damping for its inertia."""
 
     def command(self, tick: Tick) -> Array:
-        """The law's torque with another D, shape (n,) [N or N m]."""
+        """Return the torque of the law with critical D, shape (n,) [N or N m]."""
         impedance, error = self.controller.mode.impedance, tick.error
         damping = critical_damping(task_inertia(tick), impedance.stiffness)
         more = impedance.damping * error.e_rate - damping @ error.e_rate
         return tick.torque + tick.task.J.T @ more
 
 
-# What the controller runs beside, and the team that gets another torque.
-PEERS: dict[str, tuple[str, type[Rehearsal]]] = {
+# Law of the controller and rehearsal of each baseline.
+BASELINES: dict[str, tuple[str, type[Rehearsal]]] = {
     COMPLIANCE: ("noninteracting", ComplianceRehearsal),
     NATURAL: ("natural", NaturalRehearsal),
 }
 
 
 def task_inertia(tick: Tick) -> Array:
-    """Lambda = S' M S, shape (n, n)."""
+    """Return Lambda = S' M S, shape (n, n)."""
     S = np.linalg.inv(tick.task.J)
     return S.T @ tick.state.M @ S
 
 
 def critical_damping(inertia: Array, stiffness: Array) -> Array:
-    """D for an inertia (n, n) and stiffnesses K (n,), shape (n, n); 0 where there is no K."""
+    """Return critical D for inertia (n, n) and stiffness K (n,), shape (n, n); 0 where K is 0."""
     squares, modes = eigh(np.diag(stiffness), inertia)
     shaped = inertia @ modes
     return np.asarray(shaped * (2.0 * np.sqrt(np.maximum(squares, 0.0))) @ shaped.T)
 
 
-def measure_law(scenario: Scenario, law: str, rate: float, duration: float) -> Errors:
-    """Rehearses a scenario under a law or a peer.
+def measure_law(scenario: Scenario, law: str, rate: float, duration: float) -> PeakErrors:
+    """Rehearse a scenario under a law or a baseline.
 
     Args:
-        scenario: What to run.
+        scenario: The scenario.
         law: One of the laws, `NATURAL` or `COMPLIANCE`.
-        rate: Ticks per second, and updates of the hand [Hz].
-        duration: How long [s].
+        rate: Control rate and update rate of the device [Hz].
+        duration: Duration [s].
     """
-    beside, kind = PEERS.get(law, (law, Rehearsal))
-    general = replace(scenario.general, rate=rate, law=beside)
+    law_of_controller, kind = BASELINES.get(law, (law, Rehearsal))
+    general = replace(scenario.general, rate=rate, law=law_of_controller)
     haptic = scenario.haptic and replace(scenario.haptic, update_rate=rate)
     rehearsal = kind(replace(scenario, general=general, haptic=haptic))
     first = rehearsal.step()
@@ -131,11 +130,11 @@ def measure_law(scenario: Scenario, law: str, rate: float, duration: float) -> E
     speed, turning = (float(largest) for largest in speeds.max(axis=0))
     damping = _damping_per_tick(rehearsal, first, law) / rate
     intervened = bool(acted.any()) and law != COMPLIANCE
-    return Errors(law, rate, position, angle, speed, turning, damping, intervened)
+    return PeakErrors(law, rate, position, angle, speed, turning, damping, intervened)
 
 
 def _row(rehearsal: Rehearsal, tick: Tick) -> tuple[Array, tuple[float, float], bool]:
-    """Errors, largest desired speeds, and whether anything but the law acted, at a tick."""
+    """Return errors, largest desired speeds, and True if the law did not act alone."""
     speed, turning, none = 0.0, 0.0, np.zeros(1)
     for task, led in zip(rehearsal.stack.subtasks, tick.led, strict=True):
         sizes = task.magnitudes(led.reference.velocity)
@@ -145,10 +144,10 @@ def _row(rehearsal: Rehearsal, tick: Tick) -> tuple[Array, tuple[float, float], 
 
 
 def _damping_per_tick(rehearsal: Rehearsal, tick: Tick, law: str) -> float:
-    """Largest eigenvalue of inertia^-1 D [1/s], for the inertia that a law leaves or makes."""
+    """Return the largest eigenvalue of inertia^-1 D [1/s] for the task inertia under a law."""
     impedance, inertia = rehearsal.controller.mode.impedance, task_inertia(tick)
     damping = np.diag(impedance.damping)
-    if law in PEERS:
+    if law in BASELINES:
         damping = critical_damping(inertia, impedance.stiffness)
     elif law != "natural":
         slices = rehearsal.stack.slices
@@ -159,27 +158,27 @@ def _damping_per_tick(rehearsal: Rehearsal, tick: Tick, law: str) -> float:
     return float(np.abs(np.linalg.eigvals(np.linalg.solve(inertia, damping))).max())
 
 
-def compare_laws(scenario: Scenario, duration: float) -> list[Errors]:
-    """The same motion under each law and peer; under the scenario's law at other rates too.
+def compare_laws(scenario: Scenario, duration: float) -> list[PeakErrors]:
+    """Rehearse the same motion under each law and baseline, and under its own law at other rates.
 
     Args:
-        scenario: What to run.
-        duration: How long [s].
+        scenario: The scenario.
+        duration: Duration [s].
     """
     rate = scenario.general.rate
     jobs = [(scenario, scenario.general.law, rate * share, duration) for share in RATES]
     others = [law for law in LAWS if law not in (scenario.general.law, "paper")]
-    jobs += [(scenario, law, rate, duration) for law in (*others, *PEERS)]
-    order = sorted(range(len(jobs)), key=lambda number: -jobs[number][2])  # The longest first.
+    jobs += [(scenario, law, rate, duration) for law in (*others, *BASELINES)]
+    order = sorted(range(len(jobs)), key=lambda number: -jobs[number][2])  # Longest first.
     found = in_processes(measure_law, [jobs[number] for number in order])
     return [errors for _, errors in sorted(zip(order, found, strict=True), key=lambda x: x[0])]
 
 
-def order_of_fall(rows: Sequence[Errors], subtask: str) -> float | None:
-    """Power of the tick with which the error of a subtask under one law falls.
+def convergence_order(rows: Sequence[PeakErrors], subtask: str) -> float | None:
+    """Return the order of convergence of a subtask's error in the tick under one law.
 
-    From the lowest rate at which the loop is stable to the highest; None where there are not two,
-    or no error.
+    Estimated from the lowest stable rate and the highest rate; None without two stable rates or
+    without error.
     """
     rows = [row for row in rows if row.law == rows[0].law and row.damping_per_tick < STABLE]
     if len(rows) < 2:
@@ -193,14 +192,14 @@ def order_of_fall(rows: Sequence[Errors], subtask: str) -> float | None:
     return math.log(first / last) / math.log(rows[-1].rate / rows[0].rate)
 
 
-def laws_metrics(rows: Sequence[Errors], duration: float) -> dict[str, object]:
-    """The rows as they stand in `metrics.json`."""
+def laws_metrics(rows: Sequence[PeakErrors], duration: float) -> dict[str, object]:
+    """Return the rows as section of `metrics.json`."""
     names = dict.fromkeys([*rows[0].position, *rows[0].angle])
     return {
         "duration_s": duration,
         "speed_m_per_s": rows[0].speed,
         "turning_rad_per_s": rows[0].turning,
-        "order_of_fall": {name: order_of_fall(rows, name) for name in names},
+        "convergence_order": {name: convergence_order(rows, name) for name in names},
         "rows": [
             {
                 "law": row.law,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Work in several processes, where it is long enough and there are cores for it."""
+"""Parallel execution in processes, where the work is long enough."""
 
 import multiprocessing
 import os
@@ -10,22 +10,22 @@ from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 
-# A fresh interpreter each: a fork would inherit the threads of whoever asks.
+# Spawn fresh interpreters: a fork would inherit the threads of the caller.
 FRESH = multiprocessing.get_context("spawn")
 
 
 def in_processes(
-    function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]], worth_it: bool = True
+    function: Callable[..., Result], jobs: Sequence[tuple[Any, ...]], parallel: bool = True
 ) -> list[Result]:
-    """Results of a function, which must be importable, for each tuple of arguments, in order.
+    """Call a function for each tuple of arguments and return the results in order.
 
     Args:
-        function: What to call.
+        function: Importable function.
         jobs: Arguments of each call.
-        worth_it: Whether the work is long enough to start processes for.
+        parallel: False to run in this process, for short work.
     """
     workers = min(len(jobs), os.cpu_count() or 1)
-    if workers < 2 or not worth_it:
+    if workers < 2 or not parallel:
         return [function(*job) for job in jobs]
     with ProcessPoolExecutor(workers, mp_context=FRESH) as pool:
         running = [pool.submit(function, *job) for job in jobs]
@@ -33,17 +33,17 @@ def in_processes(
 
 
 @contextmanager
-def beside(
-    function: Callable[..., Result], job: tuple[Any, ...], worth_it: bool = True
+def in_background(
+    function: Callable[..., Result], job: tuple[Any, ...], parallel: bool = True
 ) -> Iterator[Callable[[], Result]]:
-    """Works on a job in another process meanwhile; gives a function that waits for the result.
+    """Call a function in another process; yield a function that waits for its result.
 
     Args:
-        function: What to call; it must be importable.
+        function: Importable function.
         job: Its arguments.
-        worth_it: Whether the work is long enough; otherwise it is done when the result is asked.
+        parallel: False to call the function in this process when the result is requested.
     """
-    if not worth_it or (os.cpu_count() or 1) < 2:
+    if not parallel or (os.cpu_count() or 1) < 2:
         yield lambda: function(*job)
         return
     with ProcessPoolExecutor(1, mp_context=FRESH) as pool:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rehearsals of a recorded scenario, to compare the recording with; several at a time."""
+"""Parallel rehearsals of variants of a recorded scenario."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -12,17 +12,17 @@ from noninteract_ros.reporting.rehearsed.processes import in_processes
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.rehearsal import Rehearsal
 
-SMALL = 6000  # ticks in all that are not worth starting processes for
+MIN_PARALLEL_TICKS = 6000  # smallest total number of ticks that is split into processes
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One way to run the scenario.
+    """Variant of a scenario.
 
     Attributes:
         law: Law in force.
-        human: Whether the haptic device speaks.
-        autonomy: Whether the planner speaks.
+        human: True if the haptic device publishes.
+        autonomy: True if the planner publishes.
     """
 
     law: str
@@ -37,8 +37,8 @@ class Joints:
     Attributes:
         q: Configuration, shape (ticks, nq).
         v: Velocity, shape (ticks, n).
-        torque: Torque that was held until each tick, shape (ticks, n).
-        error: Errors of all subtasks at the last tick before each, shape (ticks, n) [m; rad].
+        torque: Torque held until each tick, shape (ticks, n) [N or N m].
+        error: Subtask errors at the previous tick, shape (ticks, n) [m; rad].
     """
 
     q: Array
@@ -48,7 +48,7 @@ class Joints:
 
 
 def rehearse_variant(scenario: Scenario, variant: Variant, ticks: int) -> Joints:
-    """Rehearses a variant of a scenario, first state included."""
+    """Rehearse a variant of a scenario, including the first state."""
     general = replace(scenario.general, law=variant.law)
     rehearsal = Rehearsal(replace(scenario, general=general), variant.human, variant.autonomy)
     simulation = rehearsal.simulation
@@ -60,33 +60,40 @@ def rehearse_variant(scenario: Scenario, variant: Variant, ticks: int) -> Joints
 
 
 def rehearse_all(scenario: Scenario, jobs: Sequence[tuple[Variant, int]]) -> list[Joints]:
-    """Rehearses variants for so many ticks each; long ones in processes of their own."""
+    """Rehearse variants for a number of ticks each; long ones in parallel."""
     work = [(scenario, *job) for job in jobs]
-    return in_processes(rehearse_variant, work, sum(ticks for _, ticks in jobs) >= SMALL)
+    return in_processes(
+        rehearse_variant, work, sum(ticks for _, ticks in jobs) >= MIN_PARALLEL_TICKS
+    )
 
 
-def starts(scenario: Scenario) -> dict[str, float]:
-    """When each source begins to move something, or when all have begun, if that is before [s]."""
+def source_starts(scenario: Scenario) -> dict[str, float]:
+    """Return the time from which each source moves its subtask [s].
+
+    For the planner at the latest the time at which all sources have started.
+    """
     formations = [formation.time for formation in scenario.formations.values()] or [0.0]
     human = scenario.haptic.start_time if scenario.haptic else 0.0
-    # Where there are several formations the team mostly starts in the first.
+    # The team usually starts in the first of several formations.
     changed = formations[:2][-1]
     found = {"human": human, "autonomy": min(changed, max(human, formations[0]))}
-    for source, subtask in owned_subtasks(scenario).items():
-        found[source] = max(found[source], _takes(scenario.subtasks[subtask].input, source))
+    for source, subtask in led_subtasks(scenario).items():
+        found[source] = max(
+            found[source], _takeover_time(scenario.subtasks[subtask].input, source)
+        )
     return found
 
 
-def _takes(settings: InputSettings, source: str) -> float:
-    """When a source first leads a subtask by plan [s]; 0 where that is not planned."""
+def _takeover_time(settings: InputSettings, source: str) -> float:
+    """Return the time of the first planned hand-over to a source [s]; 0 if there is none."""
     if settings.authority == source:
         return 0.0
     plan = zip(settings.hand_over_times, settings.hand_over_to, strict=True)
     return min((time for time, taker in plan if taker == source), default=0.0)
 
 
-def owned_subtasks(scenario: Scenario) -> dict[str, str]:
-    """Subtask that each source of the scenario leads."""
+def led_subtasks(scenario: Scenario) -> dict[str, str]:
+    """Return the subtask that each source of the scenario leads."""
     owned = {}
     if scenario.haptic:
         owned["human"] = scenario.haptic.subtask

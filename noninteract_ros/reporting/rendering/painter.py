@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A camera and a light: convex bodies onto a plane, the farthest first."""
+"""Painter's algorithm for convex bodies, with a perspective camera and a directional light."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from scipy.spatial import ConvexHull, QhullError
 from noninteract_ros.arrays import Array
 from noninteract_ros.team.geometry.hulls import Hull
 
-DISTANCE = 4.5  # of the eye from what it sees, in radii of it
-SUN = np.array([-0.35, -0.45, 0.82]) / np.linalg.norm([-0.35, -0.45, 0.82])
+DISTANCE = 4.5  # of the camera from the centre, in radii of the scene
+LIGHT = np.array([-0.35, -0.45, 0.82]) / np.linalg.norm([-0.35, -0.45, 0.82])
 AMBIENT = 0.5
 SHADOW = "#DADADA"
 
 
 @dataclass(frozen=True)
 class Camera:
-    """A perspective camera.
+    """Perspective camera.
 
     Attributes:
-        centre: What it looks at, shape (3,) [m].
-        eye: Where it is, shape (3,) [m].
-        axes: Directions to the right, up and towards the eye as rows, shape (3, 3).
+        centre: Point in the centre of the image, shape (3,) [m].
+        eye: Position of the camera, shape (3,) [m].
+        axes: Right, up and backward directions as rows, shape (3, 3).
     """
 
     centre: Array
@@ -36,7 +36,7 @@ class Camera:
 
     @classmethod
     def towards(cls, centre: Array, radius: float, azimuth: float, elevation: float) -> "Camera":
-        """A camera that sees a ball (3,) [m] from a direction given by two angles [degrees]."""
+        """Create a camera that views a sphere about centre (3,) [m] from two angles [degrees]."""
         a, b = np.radians(azimuth), np.radians(elevation)
         back = np.array([np.cos(b) * np.cos(a), np.cos(b) * np.sin(a), np.sin(b)])
         right = np.array([-np.sin(a), np.cos(a), 0.0])
@@ -44,25 +44,25 @@ class Camera:
         return cls(centre, centre + DISTANCE * radius * back, axes)
 
     def project(self, points: Array) -> Array:
-        """Points (..., 3) in the picture, shape (..., 2) [m at the centre's distance]."""
-        seen = (points - self.eye) @ self.axes.T
+        """Project points (..., 3) into the image, shape (..., 2) [m at the centre's distance]."""
+        local = (points - self.eye) @ self.axes.T
         distance = float(np.linalg.norm(self.eye - self.centre))
-        flat: Array = seen[..., :2] * (distance / -seen[..., 2:])
-        return flat
+        image: Array = local[..., :2] * (distance / -local[..., 2:])
+        return image
 
 
 def paint(axes: Axes, camera: Camera, bodies: Sequence[tuple[str, Hull]]) -> None:
-    """Draws bodies of given colours: shaded triangles, the farthest first."""
+    """Draw bodies in given colours as shaded triangles, farthest first."""
     corners = np.concatenate([hull.corners for _, hull in bodies])
     normals = np.concatenate([hull.normals for _, hull in bodies])
     counts = [len(hull.corners) for _, hull in bodies]
     colours = np.repeat([to_rgb(colour) for colour, _ in bodies], counts, axis=0)
     a, b, c = (corners[:, corner] for corner in range(3))
     middle = corners.mean(axis=1)
-    seen = (np.cross(b - a, c - a) * (camera.eye - middle)).sum(axis=1) > 0.0
+    visible = (np.cross(b - a, c - a) * (camera.eye - middle)).sum(axis=1) > 0.0
     distance = np.linalg.norm(middle - camera.eye, axis=1)
-    order = np.flatnonzero(seen)[np.argsort(-distance[seen])]
-    light = AMBIENT + (1.0 - AMBIENT) * np.clip(normals[order] @ SUN, 0.0, 1.0)
+    order = np.flatnonzero(visible)[np.argsort(-distance[visible])]
+    light = AMBIENT + (1.0 - AMBIENT) * np.clip(normals[order] @ LIGHT, 0.0, 1.0)
     shaded = np.ones((len(order), 3, 4))
     shaded[:, :, :3] = colours[order][:, None] * light[:, :, None]
     x, y = camera.project(corners[order]).reshape(-1, 2).T
@@ -73,7 +73,7 @@ def paint(axes: Axes, camera: Camera, bodies: Sequence[tuple[str, Hull]]) -> Non
 
 
 def outlines(axes: Axes, camera: Camera, bodies: Sequence[tuple[str, Hull]]) -> None:
-    """Draws bodies as ghosts: their silhouettes, transparent, behind everything solid."""
+    """Draw bodies as ghosts: transparent silhouettes behind all solid bodies."""
     axes.add_collection(
         PolyCollection(
             [_silhouette(camera.project(hull.points)) for _, hull in bodies],
@@ -87,17 +87,17 @@ def outlines(axes: Axes, camera: Camera, bodies: Sequence[tuple[str, Hull]]) -> 
 
 
 def shadows(axes: Axes, camera: Camera, bodies: Sequence[tuple[str, Hull]], ground: float) -> None:
-    """Draws what bodies keep from a horizontal plane at a height [m] when the sun shines."""
+    """Draw the shadows of bodies on a horizontal plane at a height [m]."""
     polygons = []
     for _, hull in bodies:
         height = hull.points[:, 2:] - ground
-        fallen = hull.points - height * SUN / SUN[2]
-        polygons.append(_silhouette(camera.project(fallen)))
+        shadow = hull.points - height * LIGHT / LIGHT[2]
+        polygons.append(_silhouette(camera.project(shadow)))
     axes.add_collection(PolyCollection(polygons, facecolors=SHADOW, zorder=1.0), autolim=False)
 
 
 def _silhouette(points: Array) -> Array:
-    """Convex hull of points in the plane (m, 2); themselves where they lie on a line."""
+    """Return the convex hull of points in the plane (m, 2); collinear points unchanged."""
     try:
         return np.asarray(points[ConvexHull(points).vertices])
     except QhullError:

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where everything of a run was at one moment, so that it can be drawn.
+"""Geometry of a run for rendering: robots, held bodies and reference ghost.
 
-The recording holds the robots' joints. Bodies that they hold are put where they would rest in
-their grips, given the tools; a body that is accelerated is off that as its grips give way.
-The ghost of the team is where every subtask would be on its reference.
+The recording contains the joints of the robots only. Held bodies are drawn at their static
+equilibrium in the grasps; accelerated bodies deviate from it by the deflection of the grasps. The
+ghost is the configuration of the team in which every subtask is on its reference.
 """
 
 from dataclasses import dataclass
@@ -20,21 +20,21 @@ from noninteract_ros.scenario.shapes import Shape, shapes_of
 from noninteract_ros.team.geometry.hulls import Hull
 from noninteract_ros.team.team import PRISMATIC
 
-STEP = 1e-6  # [m; rad] of differences
+STEP = 1e-6  # [m; rad] of finite differences
 ITERATIONS = 12
-CLOSE = 1e-4  # [m; rad] how near its references the ghost of a team has to come
-LONGEST_STEP = 0.2  # [m; rad] on the way there
+CLOSE = 1e-4  # [m; rad] tolerance of the ghost
+MAX_STEP = 0.2  # [m; rad] of its iterations
 
 
 @dataclass(frozen=True)
 class Snapshot:
-    """One moment of a run.
+    """Configuration at one state of a run.
 
     Attributes:
-        time: Of the run [s].
+        time: Time of the run [s].
         q: Configuration of the plant, shape (nq,).
-        ghost: Configuration in which all subtasks are on their references, shape (nq,); None where
-            there is none or nobody knows it.
+        ghost: Configuration with all subtasks on their references, shape (nq,); None if there is
+            none or it is unknown.
         row: Row of the recorded states.
     """
 
@@ -45,7 +45,7 @@ class Snapshot:
 
 
 class Scene:
-    """Everything that can be seen in a run.
+    """Geometry of a run.
 
     Args:
         recorded: The run.
@@ -53,15 +53,15 @@ class Scene:
     Attributes:
         plant: Robots and bodies.
         centre: Middle of the tools' paths and of the bases, shape (3,) [m].
-        radius: Of all that is seen about it [m].
-        flat: Whether the team moves in a horizontal plane.
+        radius: Radius of the scene about the centre [m].
+        flat: True if the team moves in a horizontal plane.
         paths: Tool points over time, shape (m, N, 3) [m], at times `path_times`.
-        shapes: What robots and bodies look like.
-        edges: Pairs of robots that a subtask relates.
-        states: Rows of the recorded states that are numbers.
+        shapes: Shapes of robots and bodies.
+        edges: Pairs of robots related by a subtask.
+        states: Rows of finite recorded states.
 
     Raises:
-        RecordingError: None is.
+        RecordingError: No recorded state is finite.
     """
 
     def __init__(self, recorded: Recorded) -> None:
@@ -70,54 +70,54 @@ class Scene:
         self.plant = recorded.scenario.build_simulation(recorded.team, recorded.stack).plant
         self.states = np.flatnonzero(np.isfinite(recorded.q).all(axis=1))
         if not len(self.states):
-            raise RecordingError("no joint state is a number, so that there is nothing to draw")
+            raise RecordingError("no finite joint state to draw")
         self.path_times, self.paths = tool_points(recorded)
         self.edges = edges_of(recorded)
-        seen = self._corners()
-        low, high = seen.min(axis=0), seen.max(axis=0)
+        corners = self._corners()
+        low, high = corners.min(axis=0), corners.max(axis=0)
         self.centre = 0.5 * (low + high)
         self.flat = bool(high[2] - low[2] < 0.05 * np.linalg.norm(high - low))
-        self.radius = float(np.linalg.norm(seen - self.centre, axis=1).max()) or 1.0
+        self.radius = float(np.linalg.norm(corners - self.centre, axis=1).max()) or 1.0
         self.shapes: list[Shape] = shapes_of(recorded.scenario, self.plant, self.radius)
         self._data = self.plant.model.createData()
         self._bodies = self.plant.q0[len(self.team.q0) :]
 
     def _corners(self) -> Array:
-        """Points that must be in the picture, shape (m, 3) [m]: bases, joints and tools."""
+        """Return points that must be visible, shape (m, 3) [m]: bases, joints and tools."""
         points = [self.paths.reshape(-1, 3)]
         data = self.team.model.createData()
         for row in self.states[:: max(1, len(self.states) // 8)]:
             pin.forwardKinematics(self.team.model, data, self._recorded.q[row])
-            joints = [data.oMi[joint].translation for joint in self._linked]
+            joints = [data.oMi[joint].translation for joint in self._articulated_joints]
             points.append(np.array(joints).reshape(-1, 3))
         corners = np.concatenate(points)
         return corners[np.isfinite(corners).all(axis=1)]
 
     @cached_property
-    def turning(self) -> list[bool]:
-        """Of each robot, whether it is more than a mass that slides along axes."""
+    def articulated(self) -> list[bool]:
+        """True for robots with joints that are not prismatic, one entry per robot."""
         return [
             any(joint.shortname() not in PRISMATIC for joint in robot.model.joints[1:])
             for robot in self.team.robots
         ]
 
     @cached_property
-    def _linked(self) -> list[int]:
-        """Joints whose place says something: those of robots that turn."""
+    def _articulated_joints(self) -> list[int]:
+        """Indices of the joints of articulated robots."""
         names = [
             f"{robot.name}/{joint}"
-            for robot, turns in zip(self.team.robots, self.turning, strict=True)
+            for robot, turns in zip(self.team.robots, self.articulated, strict=True)
             for joint in list(robot.model.names)[1:]
             if turns
         ]
         return [self.team.model.getJointId(name) for name in names]
 
-    def moment(self, row: int) -> Snapshot:
-        """Where everything was at a state; ask in the order of time."""
+    def snapshot(self, row: int) -> Snapshot:
+        """Return the snapshot of a state; call in the order of time."""
         q = self._recorded.q[row]
         if len(self._bodies):
-            self._bodies = self._resting(q)
-        ghost = self._on_references(row)
+            self._bodies = self._body_equilibrium(q)
+        ghost = self._reference_configuration(row)
         return Snapshot(
             float(self._recorded.t[row]),
             np.concatenate((q, self._bodies)),
@@ -125,8 +125,8 @@ class Scene:
             row,
         )
 
-    def _resting(self, q: Array) -> Array:
-        """Configuration of the bodies in which grips and gravity balance (Newton's method)."""
+    def _body_equilibrium(self, q: Array) -> Array:
+        """Return the static equilibrium of the bodies in their grasps (Newton's method)."""
         plant, n = self.plant, self.team.n
         whole = np.concatenate((q, self._bodies))
         count = plant.model.nv - n
@@ -145,40 +145,40 @@ class Scene:
         return whole[len(q) :]
 
     def _force(self, whole: Array) -> Array:
-        """What acts on the bodies at rest, shape (m,) [N or N m]."""
+        """Return the force on the bodies at rest, shape (m,) [N or N m]."""
         plant = self.plant
         couplings = plant.external_loads(whole, np.zeros(plant.model.nv)).coupling_torque
         gravity = pin.computeGeneralizedGravity(plant.model, self._data, whole)
         return (couplings - gravity)[self.team.n :]
 
-    def _on_references(self, row: int) -> Array | None:
-        """Configuration on all desired values at a state (Newton's method), or None."""
-        wanted = self._wanted(row)
-        if wanted is None:
+    def _reference_configuration(self, row: int) -> Array | None:
+        """Return the configuration on all desired values (Newton's method), or None."""
+        desired = self._desired_at(row)
+        if desired is None:
             return None
         team, stack = self.team, self._recorded.stack
         q, still = self._recorded.q[row], np.zeros(team.n)
         for _ in range(ITERATIONS):
             task = stack.evaluate(team.state(q, still))
-            e = stack.difference(task.x, wanted)
+            e = stack.difference(task.x, desired)
             if np.abs(e).max() < CLOSE:
                 return q
             step = -np.linalg.lstsq(task.J, e, rcond=1e-3)[0]
-            q = team.integrate(q, step * min(1.0, LONGEST_STEP / (np.abs(step).max() or 1.0)))
+            q = team.integrate(q, step * min(1.0, MAX_STEP / (np.abs(step).max() or 1.0)))
         return None
 
-    def _wanted(self, row: int) -> Array | None:
-        """Desired values of all subtasks at a state, shape (size,); None where not recorded."""
+    def _desired_at(self, row: int) -> Array | None:
+        """Return desired values at a state, shape (size,); None if not recorded."""
         if self._desired is None:
             return None
         t, values = self._desired
         place = int(np.searchsorted(t, self._recorded.t[row] + 1e-9)) - 1
-        wanted = values[max(place, 0)]
-        return wanted if np.isfinite(wanted).all() else None
+        desired = values[max(place, 0)]
+        return desired if np.isfinite(desired).all() else None
 
     @cached_property
     def _desired(self) -> tuple[Array, Array] | None:
-        """Times and desired values (m, size) of all subtasks; None where one is missing."""
+        """Times (m,) and desired values (m, size) of all subtasks; None if any is missing."""
         names = self._recorded.stack.names
         try:
             motions = [self._recorded.motion(f"{name}/desired", name) for name in names]
@@ -189,24 +189,24 @@ class Scene:
         return motions[0].t, np.hstack([motion.position for motion in motions])
 
     def hulls(self, q: Array) -> list[tuple[int, Hull]]:
-        """Owner and body in the world of every shape, for a configuration of the plant."""
+        """Return owner and world geometry of every shape at a configuration of the plant."""
         pin.forwardKinematics(self.plant.model, self._data, q)
         return [
             (item.owner, item.hull.transformed(self._data.oMi[item.joint])) for item in self.shapes
         ]
 
     def tools(self, q: Array) -> list[pin.SE3]:
-        """Tool frames in the world, for a configuration of the plant."""
+        """Return the tool frames in the world at a configuration of the plant."""
         state = self.team.state(q[: len(self.team.q0)], np.zeros(self.team.n))
         pairs = zip(state.tool_rotations, state.tool_positions, strict=True)
         return [pin.SE3(rotation, position) for rotation, position in pairs]
 
-    def pushes(self, moment: Snapshot) -> list[tuple[Array, Array]]:
-        """Point and force of each scheduled push that acts, in the world [m, N]."""
+    def pushes(self, snapshot: Snapshot) -> list[tuple[Array, Array]]:
+        """Return point [m] and force [N] of each active scheduled push, in the world."""
         found = []
-        pin.framesForwardKinematics(self.plant.model, self._data, moment.q)
+        pin.framesForwardKinematics(self.plant.model, self._data, snapshot.q)
         for push in self._recorded.scenario.pushes.values():
-            force = push.wrench(moment.time)[:3]
+            force = push.wrench(snapshot.time)[:3]
             if force.any():
                 frame = self.plant.model.getFrameId(push.frame_name(self.team))
                 found.append((self._data.oMf[frame].translation.copy(), force))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How figures look."""
+"""Style of figures."""
 
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 DPI = 150
 WIDTH = 6.0  # [in]
-# Okabe and Ito's colours, told apart whatever one's colour vision; yellow is left out on white.
+# Okabe-Ito palette, safe for colour-blind readers; without yellow, which is faint on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 DASHES = ("--", "-", "-.", ":")
 RULES: dict[Any, Any] = {
@@ -34,16 +34,16 @@ RULES: dict[Any, Any] = {
 }
 
 
-# A decorator: what is drawn inside has the style, and no other figure of the program has.
+# Decorator that applies the style to the decorated function only.
 styled = mpl.rc_context(RULES)
 
 
 def new_figure(height: float, rows: int = 1) -> tuple[Figure, list[Axes]]:
-    """A figure with axes one below the other; it belongs to no global state.
+    """Create a figure with stacked axes, outside the global state of pyplot.
 
     Args:
         height: Height [in].
-        rows: Number of axes; they share the horizontal one.
+        rows: Number of axes; they share the horizontal axis.
     """
     figure = Figure(figsize=(WIDTH, height))
     FigureCanvasAgg(figure)
@@ -52,6 +52,6 @@ def new_figure(height: float, rows: int = 1) -> tuple[Figure, list[Axes]]:
 
 
 def save(figure: Figure, path: Path) -> Path:
-    """Writes a PNG."""
+    """Write a figure as PNG."""
     figure.savefig(path, dpi=DPI)
     return path

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a run: all metrics, checks, tables and figures."""
+"""Report of a run: metrics, checks, tables and figures."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Everything that is measured in a recorded run."""
+"""All metrics and checks of a recorded run."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,12 +15,12 @@ from noninteract_ros.reporting.metrics.closed_form import (
     closed_form,
     closed_form_check,
 )
-from noninteract_ros.reporting.metrics.holding import recorded_holding
 from noninteract_ros.reporting.metrics.influences import Influence, influences
 from noninteract_ros.reporting.metrics.link_metrics import link_metrics
 from noninteract_ros.reporting.metrics.passivity_observer import passivity_metrics
 from noninteract_ros.reporting.metrics.storage_functions import energy_metrics
 from noninteract_ros.reporting.metrics.team_account import account_metrics
+from noninteract_ros.reporting.metrics.zero_order_hold import recorded_hold_force
 from noninteract_ros.reporting.recording.recorded import Recorded
 from noninteract_ros.reporting.rehearsed.comparison import Comparer
 
@@ -30,11 +30,11 @@ LEVELS = ("OK", "WARN", "ERROR", "STALE")
 
 @dataclass(frozen=True)
 class Findings:
-    """What was measured.
+    """Metrics and checks of a run.
 
     Attributes:
         metrics: Sections of `metrics.json`; units are in the keys.
-        checks: What the run must show.
+        checks: Checks of the run.
     """
 
     metrics: dict[str, Any]
@@ -42,31 +42,31 @@ class Findings:
 
 
 def measure(recorded: Recorded, other_laws: bool = True) -> Findings:
-    """Measures a run.
+    """Compute all metrics and checks of a run.
 
     Args:
         recorded: The run.
-        other_laws: Whether the scenario is rehearsed under other laws as well, to compare.
+        other_laws: True to rehearse the scenario under other laws as well, for comparison.
 
     Raises:
         RecordingError: The recording is malformed.
     """
-    outside = influences(recorded)
+    external = influences(recorded)
     completeness, checks = completeness_metrics(recorded)
     metrics: dict[str, Any] = {
         "format": FORMAT,
-        "run": _run_metrics(recorded, outside),
+        "run": _run_metrics(recorded, external),
         "completeness": completeness,
         "tracking": _by_subtask(recorded, tracking_metrics),
     }
-    closed, closed_checks = closed_form_metrics(recorded, outside)
-    comparison = Comparer(recorded, outside, other_laws).compare()
-    holding = recorded_holding(recorded) if recorded.lockstep else None
+    closed, closed_checks = closed_form_metrics(recorded, external)
+    comparison = Comparer(recorded, external, other_laws).compare()
+    hold = recorded_hold_force(recorded) if recorded.lockstep else None
     energies: dict[str, Any] = {}
     energy_checks: list[Check] = []
     for name in recorded.stack.names:
         try:
-            energies[name], found = energy_metrics(recorded, name, holding)
+            energies[name], found = energy_metrics(recorded, name, hold)
         except RecordingError as error:
             energies[name] = {"reason": str(error)}
             found = [not_applicable(f"storage_positive.{name}", 0.0, "J", str(error))]
@@ -82,7 +82,7 @@ def measure(recorded: Recorded, other_laws: bool = True) -> Findings:
     return Findings(metrics, checks)
 
 
-def _run_metrics(recorded: Recorded, outside: list[Influence]) -> dict[str, Any]:
+def _run_metrics(recorded: Recorded, external: list[Influence]) -> dict[str, Any]:
     general = recorded.scenario.general
     return {
         "law": general.law,
@@ -91,7 +91,7 @@ def _run_metrics(recorded: Recorded, outside: list[Influence]) -> dict[str, Any]
         "duration_s": float(recorded.t[-1] - recorded.t[0]),
         "robots": list(recorded.team.names),
         "subtasks": list(recorded.stack.names),
-        "not_in_the_scenario": [item.text for item in outside],
+        "external_influences": [item.text for item in external],
     }
 
 
@@ -108,7 +108,7 @@ def _by_subtask(
 
 
 def completeness_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
-    """Whether every tick is there and every command answers a state."""
+    """Return counts of missing ticks, missing commands and invalid states."""
     ticks = recorded.ticks
     first = 0 if recorded.lockstep else int(ticks[0])
     expected = int(ticks[-1]) - first + 1
@@ -117,18 +117,19 @@ def completeness_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check
     commands: Array = np.zeros(0)
     if recorded.has("joint_commands"):
         commands = recorded.run.joints("joint_commands").stamps
-    answered, asked = (
+    commanded, published = (
         set(np.round(stamps * 1e9).astype(np.int64).tolist())
         for stamps in (commands, recorded.states.stamps)
     )
-    # The run ends with a state that nobody needs to answer any more.
-    last = max(asked)
-    unanswered, unasked = len(asked - answered - {last}), len(answered - asked)
+    # The last state of a run needs no command.
+    last = max(published)
+    unanswered = len(published - commanded - {last})
+    without_state = len(commanded - published)
     counts = {
         "ticks_missing": expected - len(np.unique(ticks)),
         "states_out_of_order": int((np.diff(ticks) <= 0).sum()),
         "states_unanswered": unanswered,
-        "commands_without_state": unasked,
+        "commands_without_state": without_state,
         "numbers_not_finite": int((~np.isfinite(np.hstack((recorded.q, recorded.v)))).sum()),
     }
     metrics = {
@@ -138,15 +139,15 @@ def completeness_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check
         "ticks_per_second": len(ticks) / wall if wall > 0.0 else None,
     }
     if not recorded.lockstep:
-        reason = "wall time: ticks may be late, and commands may answer several states"
+        reason = "wall time: ticks may be late and commands may answer several states"
         return metrics, [not_applicable(f"complete.{key}", 0.0, "", reason) for key in counts]
     return metrics, [at_most(f"complete.{key}", found, 0.0, "") for key, found in counts.items()]
 
 
 def tracking_metrics(recorded: Recorded, subtask: str) -> dict[str, Any]:
-    """Errors from the first reference on: distance of each element, angle of each rotation.
+    """Return errors from the first reference on: distances of elements, angles of rotations.
 
-    A subtask that nobody leads is to stay where it is, all the time.
+    A subtask without references is to hold its value from the first state on.
 
     Raises:
         RecordingError: A topic is missing or of another type.
@@ -155,7 +156,7 @@ def tracking_metrics(recorded: Recorded, subtask: str) -> dict[str, Any]:
     start = recorded.start(subtask)
     rows = tracking.t >= (tracking.t[:1].min(initial=0.0) if start is None else start) - 1e-9
     if not rows.any():
-        return {"reason": "no values while it was led"}
+        return {"reason": "no values while the subtask was led"}
     task = recorded.task(subtask)
     e = task.difference(tracking.actual.position[rows], tracking.desired.position[rows])
     metrics: dict[str, Any] = {"led_from_s": start}
@@ -165,7 +166,7 @@ def tracking_metrics(recorded: Recorded, subtask: str) -> dict[str, Any]:
 
 
 def _extremes(sizes: Array, unit: str) -> dict[str, float]:
-    """First, largest, mean and last of errors, shape (n, elements)."""
+    """Return initial, largest, RMS and final error of errors, shape (n, elements)."""
     return {
         f"initial_error_{unit}": float(sizes[0].max()),
         f"max_error_{unit}": float(sizes.max()),
@@ -175,14 +176,14 @@ def _extremes(sizes: Array, unit: str) -> dict[str, float]:
 
 
 def closed_form_metrics(
-    recorded: Recorded, outside: list[Influence]
+    recorded: Recorded, external: list[Influence]
 ) -> tuple[dict[str, Any], list[Check]]:
-    """Deviation of each subtask from its own differential equation."""
+    """Return the deviation of each subtask from its closed-form dynamics (29)."""
     metrics: dict[str, Any] = {}
     checks = []
     for name in recorded.stack.names:
         try:
-            found = closed_form(recorded, name, outside)
+            found = closed_form(recorded, name, external)
         except (NotApplicableError, RecordingError) as error:
             metrics[name] = {"reason": str(error)}
             checks.append(closed_form_check(recorded, name, str(error)))
@@ -204,7 +205,7 @@ def closed_form_metrics(
 
 
 def diagnostics_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
-    """Worst and last level of each program, what it refused, and what the recorder lost."""
+    """Return worst and last level and rejected inputs of each node, and the recorder's losses."""
     nodes: dict[str, Any] = {}
     statuses = recorded.run.diagnostics() if recorded.has("diagnostics") else []
     lost = None
@@ -220,7 +221,7 @@ def diagnostics_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]
         if "last rejection" in values:
             node["last_refusal"] = values["last rejection"]
         lost = int(values["lost"]) if "lost" in values else lost
-    reason = "the recorder did not say"
+    reason = "the recorder published no status"
     check = (
         not_applicable("recorder_lost", 0.0, "", reason)
         if lost is None

@@ -7,25 +7,25 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from noninteract_ros.reporting.checks.checks import Check
-from noninteract_ros.reporting.report.run_report import Report
+from noninteract_ros.reporting.report.report import Report
 
 UNITS = ("m", "rad")
 
 
 def tables(report: Report) -> list[Table]:
-    """Checks, why some do not apply, tracking and the comparison of laws."""
+    """Return the tables of checks, notes, tracking errors and comparisons."""
     return [
         checks_table(report.checks),
         notes_table(report.checks),
         tracking_table(report.metrics),
-        *crossing_tables(report.metrics),
+        *cross_motion_tables(report.metrics),
         *([laws_table(report.metrics["laws"])] if "laws" in report.metrics else []),
         *storage_tables(report.metrics.get("storage_order", {})),
     ]
 
 
 def summary(report: Report) -> str:
-    """How many checks passed, failed and do not apply, in one sentence with markup."""
+    """Return the counts of passed, failed and inapplicable checks as text with markup."""
     verdicts = [check.passed for check in report.checks]
     text = f"{verdicts.count(True)} of {len(verdicts)} checks passed"
     if open_ones := verdicts.count(None):
@@ -37,8 +37,8 @@ def summary(report: Report) -> str:
 
 
 def checks_table(checks: tuple[Check, ...]) -> Table:
-    """A row for each check; what does not apply refers to a note that says why."""
-    titles = ("check", "found", "bound", "unit", "")
+    """Return a row per check; inapplicable checks refer to a numbered note."""
+    titles = ("check", "value", "limit", "unit", "")
     table = Table(*(Column(title, no_wrap=True) for title in titles))
     reasons = _reasons(checks)
     for check in checks:
@@ -52,7 +52,7 @@ def checks_table(checks: tuple[Check, ...]) -> Table:
 
 
 def notes_table(checks: tuple[Check, ...]) -> Table:
-    """Why checks do not apply, a row for each reason, numbered as in the table of checks."""
+    """Return the numbered reasons why checks do not apply."""
     table = Table.grid(padding=(0, 1))
     for number, reason in enumerate(_reasons(checks), start=1):
         table.add_row(f"n/a ({number}):", Text(reason))
@@ -64,8 +64,8 @@ def _reasons(checks: tuple[Check, ...]) -> list[str]:
 
 
 def tracking_table(metrics: dict[str, Any]) -> Table:
-    """Errors and the closed form's deviation, a row for each subtask and unit."""
-    columns = ("max error", "rms error", "final error", "off the closed form")
+    """Return errors and deviation from the closed form, a row per subtask and unit."""
+    columns = ("max error", "RMS error", "final error", "closed-form deviation")
     table = Table("subtask", "unit", *columns)
     for name, found in metrics["tracking"].items():
         units = [unit for unit in UNITS if f"max_error_{unit}" in found]
@@ -79,8 +79,8 @@ def tracking_table(metrics: dict[str, Any]) -> Table:
     return table
 
 
-def crossing_tables(metrics: dict[str, Any]) -> list[Table]:
-    """How far each source moves each subtask, by law; none without sources."""
+def cross_motion_tables(metrics: dict[str, Any]) -> list[Table]:
+    """Return the motion of each subtask caused by each source, by law; none without sources."""
     comparison = metrics["comparison"]
     laws = comparison["moved"]
     if not comparison["led_by"]:
@@ -97,42 +97,43 @@ def crossing_tables(metrics: dict[str, Any]) -> list[Table]:
 
 
 def laws_table(laws: dict[str, Any]) -> Table:
-    """Largest errors under each law, and at each rate."""
+    """Return the largest errors under each law and at each rate."""
     kinds = [
         (name, unit)
-        for name in laws["order_of_fall"]
+        for name in laws["convergence_order"]
         for unit in UNITS
         if name in laws["rows"][0][f"max_error_{unit}"]
     ]
     titles = (rf"{name} \[{unit}]" for name, unit in kinds)
-    table = Table("largest error under", r"rate \[Hz]", *titles, "D/M", caption_justify="left")
+    table = Table("law", r"rate \[Hz]", *titles, "D/M", caption_justify="left")
     for row in laws["rows"]:
         cells = (_number(row[f"max_error_{unit}"][name]) for name, unit in kinds)
-        law = row["law"] + (" (limits acted)" if row["limits_acted"] else "")
+        law = row["law"] + (" (limits active)" if row["limits_acted"] else "")
         table.add_row(law, f"{row['rate_Hz']:g}", *cells, _number(row["damping_per_tick"]))
     orders = ", ".join(
         f"{name} {'-' if order is None else format(order, '.2f')}"
-        for name, order in laws["order_of_fall"].items()
+        for name, order in laws["convergence_order"].items()
     )
     table.caption = (
-        f"at up to {_number(laws['speed_m_per_s'])} m/s and {_number(laws['turning_rad_per_s'])}"
-        f" rad/s for {laws['duration_s']:g} s; order in the tick: {orders}\n"
-        "D/M: largest eigenvalue of inertia^-1 D in a tick; held over it, a loop is stable below 2"
+        f"largest errors at up to {_number(laws['speed_m_per_s'])} m/s and "
+        f"{_number(laws['turning_rad_per_s'])} rad/s for {laws['duration_s']:g} s; "
+        f"order in the tick: {orders}\n"
+        "D/M: largest eigenvalue of inertia^-1 D times the tick; sampled loops are stable below 2"
     )
     return table
 
 
 def storage_tables(found: dict[str, Any]) -> list[Table]:
-    """What the balance of each storage function misses at each rate; none if nobody looked."""
+    """Return residuals of the storage balances at each rate; none if not computed."""
     rows = [(name, item) for name, item in found.items() if isinstance(item, dict)]
     if not rows:
         return []
     rates = (f"{rate:g} Hz" for rate in rows[0][1]["rate_Hz"])
-    table = Table("storage less supply", "", *(rf"{rate} \[J]" for rate in rates), "order")
+    table = Table("storage residual", "", *(rf"{rate} \[J]" for rate in rates), "order")
     for name, item in rows:
         for label, key, order in (
-            ("all of it", "missed_J", "order"),
-            ("less holding the torque", "unexplained_J", "order_unexplained"),
+            ("total", "missed_J", "order"),
+            ("without hold work", "unexplained_J", "order_unexplained"),
         ):
             numbers = (*item[key], item[order])
             table.add_row(name, label, *(_number(value) for value in numbers))

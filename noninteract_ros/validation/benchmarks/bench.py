@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`noninteract bench`: what a cycle costs, each beside the floor that was measured with it."""
+"""`noninteract bench`: time per cycle, each compared with a baseline measured alongside."""
 
 import os
 import platform
@@ -19,7 +19,7 @@ from noninteract_ros.scenario.files import config_folders, find_scenario, read_p
 from noninteract_ros.scenario.rehearsal import History, rehearse
 from noninteract_ros.team.models.urdf_files import EXAMPLES, share_folders
 
-BATCH = 50  # calls of one thing before the other thing has its turn
+BATCH = 50  # consecutive calls of one task
 WARM_UP = 20  # calls that are not counted
 PARTS = ("law", "node", "lockstep", "wall")
 PACKAGES = ("numpy", "numba", "pin", "ros-jazzy-rclpy")
@@ -27,12 +27,12 @@ PACKAGES = ("numpy", "numba", "pin", "ros-jazzy-rclpy")
 
 @dataclass(frozen=True)
 class BenchSettings:
-    """How much is measured.
+    """Extent of a benchmark.
 
     Attributes:
-        ticks: Cycles that are timed, of each kind.
-        rounds: How often real programs and their floor take turns.
-        seconds: How long each of these turns lasts [s].
+        ticks: Number of timed cycles of each task.
+        rounds: Number of alternations of the programs and their baseline.
+        seconds: Duration of each run of the programs [s].
     """
 
     ticks: int = 2000
@@ -42,13 +42,13 @@ class BenchSettings:
 
 @dataclass(frozen=True)
 class Row:
-    """One measured thing.
+    """Times of one task.
 
     Attributes:
         part: Part of the benchmark.
-        name: What was measured.
-        times: Each measured time [us], shape (count,).
-        floor: Name of the row that it is compared with, or an empty text: it is a floor itself.
+        name: Name of the task.
+        times: Measured times [us], shape (count,).
+        floor: Name of the baseline's row; empty for a baseline.
     """
 
     part: str
@@ -58,63 +58,66 @@ class Row:
 
     @property
     def median(self) -> float:
-        """[us]."""
+        """Median [us]."""
         return float(np.median(self.times))
 
     @property
     def p10(self) -> float:
-        """[us]; on a busy machine it tells more of the thing, and the median of the machine."""
+        """10th percentile [us]; less sensitive to the load of the machine than the median."""
         return float(np.percentile(self.times, 10))
 
     @property
     def p99(self) -> float:
-        """[us]."""
+        """99th percentile [us]."""
         return float(np.percentile(self.times, 99))
 
 
 class Timed(Protocol):
-    """Something to be timed again and again."""
+    """Task to be timed repeatedly."""
 
     def prepare(self) -> None:
-        """What the next run needs; not timed."""
+        """Prepare the next run; not timed."""
 
     def run(self) -> None:
-        """What is timed."""
+        """Run once; timed."""
 
 
-def take_turns(things: Mapping[str, Timed], count: int) -> dict[str, Array]:
-    """Times of each run [us], shape (count,), in batches A B A B ...: all share the load."""
-    times: dict[str, list[float]] = {name: [] for name in things}
-    for thing in things.values():
+def time_alternately(tasks: Mapping[str, Timed], count: int) -> dict[str, Array]:
+    """Return the times of each task [us], shape (count,), in alternating batches A B A B ...
+
+    Alternation exposes all tasks to the same load of the machine.
+    """
+    times: dict[str, list[float]] = {name: [] for name in tasks}
+    for task in tasks.values():
         for _ in range(WARM_UP):
-            thing.prepare()
-            thing.run()
+            task.prepare()
+            task.run()
     for done in range(0, count, BATCH):
-        for name, thing in things.items():
+        for name, task in tasks.items():
             for _ in range(min(BATCH, count - done)):
-                thing.prepare()
-                began = time.perf_counter_ns()
-                thing.run()
-                times[name].append(1e-3 * (time.perf_counter_ns() - began))
+                task.prepare()
+                start = time.perf_counter_ns()
+                task.run()
+                times[name].append(1e-3 * (time.perf_counter_ns() - start))
     return {name: np.array(found) for name, found in times.items()}
 
 
 def bench_scenarios() -> dict[str, dict[str, Any]]:
-    """Values of all scenarios of the package whose robots are installed, by name."""
+    """Return the values of all scenarios whose robots are installed, by name."""
     names = {file.stem for folder in config_folders() for file in folder.glob("*.yaml")}
     files = {name: find_scenario(name) for name in sorted(names)}
     return {name: read_parameters(file) for name, file in files.items() if _installed(file)}
 
 
 def _installed(file: Path) -> bool:
-    """Whether a scenario's robots are there: those of example-robot-data are an extra."""
+    """Return True if a scenario's robot models are installed (example-robot-data is an extra)."""
     installed = any((share / EXAMPLES).is_dir() for share in share_folders())
     return installed or EXAMPLES not in file.read_text()
 
 
 @dataclass(frozen=True)
 class BenchCase:
-    """What a scenario's team goes through while it is timed.
+    """Recorded states of a scenario that are replayed while timing.
 
     Attributes:
         scenario: The scenario, in lockstep.
@@ -126,13 +129,13 @@ class BenchCase:
 
     @classmethod
     def of(cls, values: Mapping[str, Any], ticks: int) -> "BenchCase":
-        """The first ticks of a scenario, without ROS."""
+        """Rehearse the first ticks of a scenario."""
         scenario = Scenario.from_dict(values)
         return cls(scenario, rehearse(scenario, ticks / scenario.general.rate))
 
 
 def machine() -> dict[str, Any]:
-    """What the numbers were measured on, and how busy it was."""
+    """Return hardware, versions and load of the machine."""
     return {
         "cpu": _cpu(),
         "cores": len(os.sched_getaffinity(0)),
@@ -144,7 +147,7 @@ def machine() -> dict[str, Any]:
 
 
 def load_average() -> list[float]:
-    """Runnable tasks over the last 1, 5 and 15 minutes."""
+    """Return the mean number of runnable tasks over 1, 5 and 15 minutes."""
     return [round(load, 2) for load in os.getloadavg()]
 
 
@@ -162,7 +165,7 @@ def _version(package: str) -> str:
 
 
 def as_dict(rows: list[Row], around: Mapping[str, Any]) -> dict[str, Any]:
-    """For JSON: the machine, and the figures of each row."""
+    """Return the machine and the statistics of each row as a dictionary for JSON."""
     floors = {row.name: row for row in rows}
     figures = [
         {
@@ -182,7 +185,7 @@ def as_dict(rows: list[Row], around: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def table(figures: Mapping[str, Any]) -> Table:
-    """What `as_dict` returns, for a terminal."""
+    """Return the result of `as_dict` as a table for the terminal."""
     result = Table(title=_title(figures["machine"]), title_justify="left")
     for name in (
         "measured",

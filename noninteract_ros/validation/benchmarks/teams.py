@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Teams of arms whose law `noninteract bench` times beside the scenarios: how it grows."""
+"""Teams of arms for timing the growth of the law with the number of robots."""
 
 from typing import Any
 
@@ -9,12 +9,12 @@ FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 
 
 def bench_teams() -> dict[str, dict[str, Any]]:
-    """Values of scenarios of Pandas, by name; their models come with the extra `robots`."""
+    """Return the values of scenarios of Pandas by name; models need the extra `robots`."""
     return {f"{count} Pandas": pandas(count) for count in COUNTS}
 
 
 def pandas(count: int) -> dict[str, Any]:
-    """Values of a scenario: Pandas in rows, led by their pose, their chain, and their elbows."""
+    """Return the values of a scenario of Pandas in rows, with pose, chain and elbow subtasks."""
     names = [f"panda_{number + 1}" for number in range(count)]
     robots = {
         name: {
@@ -23,7 +23,7 @@ def pandas(count: int) -> dict[str, Any]:
             "tool_frame": "panda_hand_tcp",
             "locked_joints": list(FINGERS),
             "base_pose": [1.2 * (i % 6), 1.2 * (i // 6), 0.0, 0.0, 0.0, 0.0, 1.0],
-            # Unlike ones, so that no tool points exactly as another.
+            # Distinct angles, so that no two tools have the same orientation.
             "initial_position": [angle + 0.01 * (i % 7) for angle in START],
         }
         for i, name in enumerate(names)

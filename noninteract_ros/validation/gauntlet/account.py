@@ -49,7 +49,7 @@ class CompiledAccount:
 
 @cache
 def compiled_account() -> CompiledAccount:
-    """Translates the account; its functions are compiled where they are first called."""
+    """Translate the account; its functions are compiled where they are first called."""
     types = _twins(energy_tank)
     translated = _Translation(types)
     functions = translated.visit(_functions(energy_tank))
@@ -89,7 +89,7 @@ def _functions(module: ModuleType) -> ast.Module:
 
 
 class _Translation(ast.NodeTransformer):
-    """Writes `replace(tank, a=x)` as `replace_a(tank, x)`; drops annotations.
+    """Write `replace(tank, a=x)` as `replace_a(tank, x)`; drops annotations.
 
     Args:
         types: The named tuples, by name.

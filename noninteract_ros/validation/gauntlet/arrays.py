@@ -187,7 +187,7 @@ def inverted(A: Block) -> Block:
 
 @compiled
 def put(A: Array, at: int, block: Block) -> None:
-    """Writes a diagonal block."""
+    """Write a diagonal block."""
     A[at, at], A[at, at + 1], A[at + 1, at], A[at + 1, at + 1] = block
 
 

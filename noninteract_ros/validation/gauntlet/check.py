@@ -32,7 +32,7 @@ GATES = (
 
 
 def check_gauntlet(settings: GauntletSettings) -> CheckReport:
-    """Runs all cases under all laws and counts, or tells a single case in full."""
+    """Run all cases under all laws and counts, or tells a single case in full."""
     if settings.only is not None:
         return one_case(settings, settings.only)
     return counted(settings, run_cases(settings))

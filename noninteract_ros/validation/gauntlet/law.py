@@ -91,7 +91,7 @@ def new_terms(team: TeamArrays) -> Terms:
 
 @compiled
 def observe(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
-    """Writes the terms of a state of the plant."""
+    """Write the terms of a state of the plant."""
     if len(team.arms):
         arms_at(team, terms, q, v)
         return
@@ -131,7 +131,7 @@ def arms_at(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
 
 @compiled
 def at_tools(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
-    """Writes tool matrices, tool coordinates (into spare), weights and energies of arms."""
+    """Write tool matrices, tool coordinates (into spare), weights and energies of arms."""
     terms.energies[KINETIC] = terms.energies[LIFTED] = 0.0
     for i in range(len(team.arms)):
         at = 2 * i

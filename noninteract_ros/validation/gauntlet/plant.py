@@ -150,7 +150,7 @@ def touching(around: SurroundingsArrays, z: Array, force: Array) -> float:
 def tool_motion(
     team: TeamArrays, q: Array, v: Array, z: Array, z_rate: Array, J: Array, bias: Array
 ) -> None:
-    """Writes z, dz/dt, its Jacobian and d2z/dt2 at constant velocity, of arms and bodies."""
+    """Write z, dz/dt, its Jacobian and d2z/dt2 at constant velocity, of arms and bodies."""
     for i in range(len(q)):
         z[i], z_rate[i], bias[i] = q[i], v[i], 0.0
         for j in range(len(q)):
@@ -175,7 +175,7 @@ def arms_acceleration(
     torque: Array,
     acceleration: Array,
 ) -> float:
-    """Writes the acceleration of joints and bodies; returns the heat's power [W]."""
+    """Write the acceleration of joints and bodies; returns the heat's power [W]."""
     z, z_rate, bias, force = plant.room[0], plant.room[1], plant.room[2], plant.room[3]
     J, M = plant.square
     tool_motion(team, q, v, z, z_rate, J, bias)

@@ -52,7 +52,7 @@ from noninteract_ros.validation.gauntlet.state import (
 def command(
     team: TeamArrays, terms: Terms, law: int, memory: Memory, tank: Any, to: Array
 ) -> None:
-    """Writes the torques of impedance (with gravity's) and decoupling, shape (2, n)."""
+    """Write the torques of impedance (with gravity's) and decoupling, shape (2, n)."""
     pull, beyond = memory.force
     impedance_force(team, terms, tank.grip, pull)
     multiply_transposed(terms.J, pull, to[0])
@@ -125,7 +125,7 @@ def move(
 
 @compiled
 def record(row: Array, t: float, tank: Any, terms: Terms, memory: Memory, meter: Meter) -> None:
-    """Writes a row of a trace: time, gates, account, energies, residual, q, v, torque."""
+    """Write a row of a trace: time, gates, account, energies, residual, q, v, torque."""
     row[0], row[1], row[2], row[3], row[4] = t, tank.sigma, tank.grip, tank.level, tank.reserve
     row[5], row[6], row[7] = tank.lost, tank.potential, terms.energies[KINETIC]
     row[8], row[9] = memory.outside[0] + memory.outside[1], meter.now[0]
@@ -174,7 +174,7 @@ def run(
     trace: Array,
     stride: int,
 ) -> tuple[int, int, Any]:
-    """Runs one case until it is at rest, grows without bound or its time is over.
+    """Run one case until it is at rest, grows without bound or its time is over.
 
     Args:
         team: The robots.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A team under the law at random states: where its identities are measured."""
+"""Random states of a team for measuring the identities of the law."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,41 +16,41 @@ from noninteract_ros.errors import TeamError
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team, TeamState
 
-REGULAR = SafetySettings().singularity_begin  # relative; below, the law is no longer alone
+REGULAR = SafetySettings().singularity_begin  # relative regularity; lower values change the law
 SPEED = 1.0  # [m/s or rad/s] bound of joint velocities
 ERROR = 0.2  # [SI] bound of errors, desired accelerations and forces
-REFUSALS = 1000  # draws in a row after which a team counts as singular everywhere
-LEAP = 10.0  # times the way that a subtask's velocity leads in a step; beyond, its value jumps
+MAX_REJECTIONS = 1000  # consecutive rejected draws of a team that is singular everywhere
+MAX_JUMP = 10.0  # times the way that a subtask's velocity leads in a step; beyond, its value jumps
 
 STEP = 5e-4  # [s] between the states of a difference quotient
-PLACES = (-3, -2, -1, 1, 2, 3)  # steps at which they stand
+OFFSETS = (-3, -2, -1, 1, 2, 3)  # steps at which they stand
 WEIGHTS = (-1 / 60, 9 / 60, -45 / 60, 45 / 60, -9 / 60, 1 / 60)  # central, of order 6
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A random state, and what lies along its velocity.
+    """Random state with its neighbours along the velocity.
 
     Attributes:
         state: Team dynamics.
         dynamics: Task dynamics.
-        error: Tracking state that fits it.
-        around: Task dynamics at the `PLACES`, on the straight line along the velocity.
+        error: Random tracking state.
+        neighbours: Task dynamics at the `OFFSETS`, on the straight line along the velocity.
     """
 
     state: TeamState
     dynamics: TaskDynamics
     error: TaskError
-    around: tuple[TaskDynamics, ...]
+    neighbours: tuple[TaskDynamics, ...]
 
     def rate(self, term: Callable[[TaskDynamics], Array]) -> Array:
-        """Time derivative of a term along the velocity, to order 6 in the step."""
-        values = np.array([term(dynamics) for dynamics in self.around])
+        """Return the time derivative of a term along the velocity, to order 6 in the step."""
+        values = np.array([term(dynamics) for dynamics in self.neighbours])
         return np.tensordot(WEIGHTS, values, axes=1) / STEP
 
 
 class LawProbe:
-    """A team under the law, to be looked at in any state.
+    """Team and gains at random states.
 
     Args:
         team: The robots.
@@ -58,38 +58,38 @@ class LawProbe:
         impedance: Gains of all subtasks.
 
     Attributes:
-        refused: States that were drawn so far and not taken.
+        rejected: Number of rejected states so far.
     """
 
     def __init__(self, team: Team, stack: SubtaskStack, impedance: Impedance) -> None:
         self.team, self.stack, self.impedance = team, stack, impedance
-        self.refused = 0
+        self.rejected = 0
         self._least = REGULAR * best_regularity(team, stack)
         self._range = joint_range(team)
 
     def dynamics(self, state: TeamState) -> TaskDynamics:
-        """Task dynamics at a state."""
+        """Return the task dynamics at a state."""
         task = self.stack.evaluate(state)
         return decoupling.task_dynamics(state, task, self.stack.slices, self.impedance.inertias)
 
     def samples(self, count: int, seed: int) -> Iterator[Sample]:
-        """Random states in the whole range of the joints, away from singularities.
+        """Yield random states in the whole range of the joints, away from singularities.
 
-        A state is drawn again where the task Jacobian is less regular than `REGULAR`, relative to
-        the team's best, or where a subtask's value jumps along the velocity, as the mean of two
-        orientations does where they face opposite ways.
+        States are rejected if the regularity of the task Jacobian is below `REGULAR`, relative to
+        the team's best, or if a subtask's value jumps along the velocity, as the mean of two
+        opposite orientations does.
 
         Raises:
             TeamError: No such state is found.
         """
         rng = np.random.default_rng(seed)
         for _ in range(count):
-            for _ in range(REFUSALS):
+            for _ in range(MAX_REJECTIONS):
                 if (sample := self._draw(rng)) is not None:
                     break
-                self.refused += 1
+                self.rejected += 1
             else:
-                text = f"singular at each of {REFUSALS} random states of its joints' range"
+                text = f"singular at each of {MAX_REJECTIONS} random states of its joints' range"
                 raise TeamError(text)
             yield sample
 
@@ -105,17 +105,19 @@ class LawProbe:
         ):
             return None
         x_rate = dynamics.J @ state.v
-        places = [
-            self.team.state(self.team.integrate(q, place * STEP * state.v), state.v)
-            for place in PLACES
+        neighbours = [
+            self.team.state(self.team.integrate(q, offset * STEP * state.v), state.v)
+            for offset in OFFSETS
         ]
-        if self._jumps(places, x_rate):
+        if self._jumps(neighbours, x_rate):
             return None
         error = TaskError(e, e_rate, x_rate - e_rate, acceleration, force)
-        return Sample(state, dynamics, error, tuple(map(self.dynamics, places)))
+        return Sample(state, dynamics, error, tuple(map(self.dynamics, neighbours)))
 
-    def _jumps(self, places: Sequence[TeamState], x_rate: Array) -> bool:
-        """Whether a value moves much further between the outer places than its velocity leads."""
-        first, *_, last = (self.stack.evaluate(state).x for state in places)
-        way = np.abs(self.stack.difference(last, first))
-        return bool(way.max() > LEAP * (PLACES[-1] - PLACES[0]) * STEP * np.abs(x_rate).max())
+    def _jumps(self, neighbours: Sequence[TeamState], x_rate: Array) -> bool:
+        """Return True if a value moves much further than its velocity between the neighbours."""
+        first, *_, last = (self.stack.evaluate(state).x for state in neighbours)
+        distance = np.abs(self.stack.difference(last, first))
+        return bool(
+            distance.max() > MAX_JUMP * (OFFSETS[-1] - OFFSETS[0]) * STEP * np.abs(x_rate).max()
+        )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The law as the paper writes it, alpha + Gamma tau~_c: the reference for the fast form."""
+"""The law as written in the paper, alpha + Gamma tau~_c: reference for the inverse dynamics."""
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from noninteract_ros.control.law.impedance import Impedance
 
 
 def block_diagonal(dynamics: TaskDynamics, blocks: tuple[Array, ...]) -> Array:
-    """Blocks of the subtasks on a diagonal, shape (n, n)."""
+    """Return the block-diagonal matrix of the subtasks, shape (n, n)."""
     result = np.zeros_like(dynamics.M)
     for part, block in zip(dynamics.slices, blocks, strict=True):
         result[part, part] = block
@@ -17,13 +17,13 @@ def block_diagonal(dynamics: TaskDynamics, blocks: tuple[Array, ...]) -> Array:
 
 
 def decoupling_matrix(dynamics: TaskDynamics) -> Array:
-    """Gamma of Theorem 1, shape (n, n): J M^-1 Gamma = blkdiag(M_i^-1)."""
+    """Return Gamma of Theorem 1, shape (n, n): J M^-1 Gamma = blkdiag(M_i^-1)."""
     inverses = tuple(np.linalg.inv(inertia) for inertia in dynamics.inertias)
     return dynamics.MS @ block_diagonal(dynamics, inverses)  # Eq. (16).
 
 
 def corollary_decoupling_matrix(M: Array, J_1: Array, J_2: Array) -> Array:
-    """Gamma of Corollary 1 for two subtasks, shape (n, n), with (19) and (20) corrected."""
+    """Return Gamma of Corollary 1 for two subtasks, shape (n, n), corrected (19) and (20)."""
 
     def null_space(J: Array) -> Array:
         M_inverse_Jt = np.linalg.solve(M, J.T)
@@ -33,7 +33,7 @@ def corollary_decoupling_matrix(M: Array, J_1: Array, J_2: Array) -> Array:
 
 
 def task_coriolis(dynamics: TaskDynamics) -> Array:
-    """C_s = M_s (J M^-1 C - J_rate) S, shape (n, n)."""
+    """Return C_s = M_s (J M^-1 C - J_rate) S, shape (n, n)."""
     M_s = block_diagonal(dynamics, dynamics.inertias)
     return (
         M_s @ (dynamics.J @ np.linalg.solve(dynamics.M, dynamics.C) - dynamics.J_rate) @ dynamics.S
@@ -41,7 +41,7 @@ def task_coriolis(dynamics: TaskDynamics) -> Array:
 
 
 def subtask_coriolis(dynamics: TaskDynamics) -> tuple[Array, ...]:
-    """C~_i = S_i' (C S_i + M dS_i/dt) of each subtask, shape (p_i, p_i); dM_i/dt - 2 C~_i skew."""
+    """Return C~_i = S_i' (C S_i + M dS_i/dt), shape (p_i, p_i) each; dM_i/dt - 2 C~_i is skew."""
     S_rate = -dynamics.S @ dynamics.J_rate @ dynamics.S
     mu = dynamics.S.T @ (dynamics.C @ dynamics.S + dynamics.M @ S_rate)
     return tuple(
@@ -51,13 +51,13 @@ def subtask_coriolis(dynamics: TaskDynamics) -> tuple[Array, ...]:
 
 
 def paper_subtask_coriolis(dynamics: TaskDynamics) -> tuple[Array, ...]:
-    """C_s,ii of each subtask, which Theorem 2 keeps, shape (p_i, p_i)."""
+    """Return C_s,ii of each subtask, as kept by Theorem 2, shape (p_i, p_i) each."""
     C_s = task_coriolis(dynamics)
     return tuple(C_s[part, part] for part in dynamics.slices)
 
 
 def state_feedback(dynamics: TaskDynamics, v: Array, kept: tuple[Array, ...]) -> Array:
-    """alpha = Gamma (C_s - blkdiag(kept)) J v + g, shape (n,) [N or N m]."""
+    """Return alpha = Gamma (C_s - blkdiag(kept)) J v + g, shape (n,) [N or N m]."""
     surplus = task_coriolis(dynamics) - block_diagonal(dynamics, kept)
     return decoupling_matrix(dynamics) @ surplus @ dynamics.J @ v + dynamics.g  # Eq. (26).
 
@@ -65,7 +65,7 @@ def state_feedback(dynamics: TaskDynamics, v: Array, kept: tuple[Array, ...]) ->
 def subtask_force(
     dynamics: TaskDynamics, error: TaskError, impedance: Impedance, kept: tuple[Array, ...]
 ) -> Array:
-    """tau~_c of every subtask, shape (n,) [N]."""
+    """Return tau~_c of all subtasks, shape (n,) [N; N m]."""
     M_s = block_diagonal(dynamics, dynamics.inertias)
     C_kept = block_diagonal(dynamics, kept)
     return (
@@ -84,14 +84,14 @@ def plain_torque(
     impedance: Impedance,
     kept: tuple[Array, ...],
 ) -> Array:
-    """alpha + Gamma tau~_c, shape (n,) [N or N m].
+    """Return alpha + Gamma tau~_c, shape (n,) [N or N m].
 
     Args:
         dynamics: Task dynamics at the state.
         v: Joint velocity, shape (n,).
         error: Tracking state of the subtasks.
         impedance: Gains.
-        kept: Coriolis matrices that the subtasks keep: `subtask_coriolis` for the corrected law,
+        kept: Coriolis matrices of the closed loops: `subtask_coriolis` for the corrected law,
             `paper_subtask_coriolis` for the paper's.
     """
     return state_feedback(dynamics, v, kept) + decoupling_matrix(dynamics) @ subtask_force(
@@ -100,7 +100,7 @@ def plain_torque(
 
 
 def natural_torque(dynamics: TaskDynamics, error: TaskError, impedance: Impedance) -> Array:
-    """J' (Lambda a_d + mu v_d - D e_rate - h(e) + f) + g, shape (n,) [N or N m]."""
+    """Return J' (Lambda a_d + mu v_d - D e_rate - h(e) + f) + g, shape (n,) [N or N m]."""
     S_rate = -dynamics.S @ dynamics.J_rate @ dynamics.S
     mu = dynamics.S.T @ (dynamics.C @ dynamics.S + dynamics.M @ S_rate)
     force = (

@@ -24,12 +24,12 @@ def checks(folder: Path, **changes: Any) -> dict[str, Check]:
     [
         (
             {"robot_1__effort_limit": [1.0], "robot_2__effort_limit": [1.0]},
-            "changed the torques of",
+            "changed the torque in",
             ["closed_form.cooperative", "closed_form.relative", "noninteraction.human"],
         ),
         (
             {"robot_1__friction": [0.5]},
-            "the joints have friction",
+            "joint friction",
             ["closed_form.relative", "noninteraction.human", "storage_passive.relative"],
         ),
         (

@@ -10,8 +10,8 @@ from rehearsed import record
 
 from noninteract_ros.control.law.impedance import Impedance
 from noninteract_ros.reporting.checks.checks import Check
-from noninteract_ros.reporting.metrics.holding import deflection, recorded_holding
 from noninteract_ros.reporting.metrics.storage_functions import energy_metrics
+from noninteract_ros.reporting.metrics.zero_order_hold import deflection, recorded_hold_force
 from noninteract_ros.reporting.recording.recorded import Recorded
 from noninteract_ros.reporting.report.metrics import measure
 from noninteract_ros.scenario.files import find_scenario, read_parameters
@@ -56,8 +56,8 @@ def test_what_holding_explains_falls_with_the_tick(tmp_path):
 def test_the_balance_of_energy_closes_with_the_work_of_holding(tmp_path):
     """Without it (33) misses forty times as much, on arms that start on their references."""
     recorded = arms(tmp_path)
-    with_work, _ = energy_metrics(recorded, "cooperative", recorded_holding(recorded))
-    assert with_work["rate_mismatch_J"] < with_work["work_of_holding_J"] / 40.0
+    with_work, _ = energy_metrics(recorded, "cooperative", recorded_hold_force(recorded))
+    assert with_work["rate_mismatch_J"] < with_work["hold_work_J"] / 40.0
 
 
 def test_a_law_that_makes_energy_is_not_excused(tmp_path):

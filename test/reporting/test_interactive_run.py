@@ -22,7 +22,7 @@ from noninteract_ros.reporting.metrics import intervals
 from noninteract_ros.reporting.metrics.closed_form import closed_form
 from noninteract_ros.reporting.metrics.influences import influences
 from noninteract_ros.reporting.metrics.passivity_observer import observe
-from noninteract_ros.reporting.metrics.storage_functions import account
+from noninteract_ros.reporting.metrics.storage_functions import storage_balance
 from noninteract_ros.reporting.recording.recorded import Recorded
 from noninteract_ros.reporting.recording.writer import RunWriter
 from noninteract_ros.reporting.report.metrics import measure
@@ -132,9 +132,9 @@ def test_a_run_that_is_led_by_hand_fails_no_claim(
 def test_what_is_judged_leaves_out_just_what_is_not_the_laws(
     session: tuple[Recorded, dict[str, Check]],
 ) -> None:
-    """Changes as long as they fade, the stop, the reset; everything else is in."""
+    """Change as long as they fade, the stop, the reset; everything else is in."""
     recorded, _ = session
-    found = account(recorded, "cooperative")
+    found = storage_balance(recorded, "cooperative")
     middle = 0.5 * (found.t[1:] + found.t[:-1])
     fade = recorded.scenario.general.transition_time
     out = [(0.8, 1.0 + fade), (1.2, 1.2 + fade), (1.5, 1.5 + fade), (1.8, 1.8 + fade)]
@@ -153,7 +153,7 @@ def test_what_is_judged_leaves_out_just_what_is_not_the_laws(
 
 def account_of_gates(recorded: Recorded, t: np.ndarray) -> np.ndarray:
     """Whether nothing but a change or a stop took part in the torque around each time."""
-    told = recorded.told("cooperative", "interventions")
+    told = recorded.energy_entry("cooperative", "interventions")
     assert told is not None
     counts = np.interp(t - 0.02, *told), np.interp(t + 0.02, *told)
     return np.asarray(counts[0] == counts[1])
@@ -181,7 +181,7 @@ def test_each_subtask_still_follows_its_own_equation(tmp_path: Path) -> None:
 def test_a_reset_is_no_motion(session: tuple[Recorded, dict[str, Check]]) -> None:
     """The observer of energies does not take it for work that somebody did."""
     recorded, _ = session
-    put = recorded.t[1:][~intervals.moved_by_itself(recorded)]
+    put = recorded.t[1:][~intervals.continuous_steps(recorded)]
     np.testing.assert_allclose(put, [2.35])
     assert observe(recorded).gaps == 1
 
@@ -189,7 +189,7 @@ def test_a_reset_is_no_motion(session: tuple[Recorded, dict[str, Check]]) -> Non
 def test_who_leads_is_told(session: tuple[Recorded, dict[str, Check]]) -> None:
     """Nobody, before the person speaks and where they let go."""
     recorded, _ = session
-    told = recorded.told("cooperative", "leader")
+    told = recorded.energy_entry("cooperative", "leader")
     assert told is not None
     leader = dict(zip(np.round(told[0], 3).tolist(), told[1].astype(int).tolist(), strict=True))
     assert AUTHORITIES[leader[0.04]] == "hold"
@@ -209,7 +209,7 @@ def test_figures_show_who_led_and_when_the_law_was_not_alone(
     for figure in (tracking_figure(recorded, "relative"), storage_figure(recorded)):
         assert [len(axes.patches) for axes in figure.axes] == [len(spans)] * 2
         (legend,) = figure.legends
-        assert legend.get_texts()[-1].get_text() == "stop or change"
+        assert legend.get_texts()[-1].get_text() == "stop or transition"
     assert storage_figure(recorded).axes[1].get_xlabel() == "time [s]"
     assert account_figure(recorded).axes[2].get_legend() is not None
 
