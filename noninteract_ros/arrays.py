@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The array type of all signatures; docstrings give shapes and units."""
+"""Array type of all signatures; docstrings give shapes and units."""
 
 from typing import Any
 

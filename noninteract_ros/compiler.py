@@ -15,7 +15,7 @@ FIRST = cast(int, np.intp(0))  # A literal would have functions compiled once mo
 
 
 @cache
-def _stamp(folder: Path) -> bytes:
+def _source_digest(folder: Path) -> bytes:
     """Digest of all sources of a folder: its functions call each other across files."""
     digest = hashlib.sha256()
     for file in sorted(folder.glob("*.py")):
@@ -30,16 +30,16 @@ def compiled(function: Function) -> Function:
     gives inf or NaN, as numpy's does. The code is kept where numba finds a place, beside the
     source or in the user's cache; where there is none, each process compiles anew.
     """
-    return _kept(numba.njit(error_model="numpy", no_cfunc_wrapper=True)(function))
+    return _cached(numba.njit(error_model="numpy", no_cfunc_wrapper=True)(function))
 
 
 def inner(function: Function) -> Function:
     """The same for functions that only compiled ones call, which saves half the time for them."""
     options = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
-    return _kept(numba.njit(error_model="numpy", **options)(function))
+    return _cached(numba.njit(error_model="numpy", **options)(function))
 
 
-def _kept(kernel: Any) -> Any:
+def _cached(kernel: Any) -> Any:
     """The function with its machine code kept until any source in its folder changes.
 
     numba alone looks at the function's own file, and would go on with what has changed elsewhere.
@@ -51,5 +51,5 @@ def _kept(kernel: Any) -> Any:
     except RuntimeError:
         return kernel
     folder = Path(kernel.py_func.__code__.co_filename).parent
-    kernel._cache._cache_file._source_stamp = _stamp(folder)
+    kernel._cache._cache_file._source_stamp = _source_digest(folder)
     return kernel

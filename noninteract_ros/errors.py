@@ -1,20 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The exceptions of this package; every one is a `NoninteractError`."""
+"""Exceptions of this package, all derived from `NoninteractError`."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
 
 
 class NoninteractError(Exception):
-    """Base of every error that this package raises on purpose."""
+    """Base class of all errors that this package raises."""
 
 
 class ScenarioError(NoninteractError):
-    """A configuration key is missing, unknown, of the wrong type or out of range.
+    """Error for a configuration key that is missing, unknown, of the wrong type or out of range.
 
     Attributes:
         key: Full dotted key, e.g. `cooperative.stiffness`.
-        file: Parameter file that holds the key, where it is known.
+        found: Value that was given.
+        allowed: Values that are accepted.
+        file: Parameter file that holds the key; None if unknown.
     """
 
     def __init__(self, key: str, found: object, allowed: str, file: str | None = None) -> None:
@@ -27,23 +29,23 @@ class ScenarioError(NoninteractError):
 
 
 class TeamError(NoninteractError):
-    """The robots cannot be joined into one team."""
+    """Error for robots that cannot be joined into one team."""
 
 
 class SubtaskError(NoninteractError):
-    """The subtasks violate an assumption of the law (the paper's assumptions 1 to 3)."""
+    """Error for subtasks that violate one of the paper's assumptions 1 to 3."""
 
 
 class InputError(NoninteractError):
-    """A message or an input is refused whole; the text says why."""
+    """Error for a rejected message or input; the text gives the reason."""
 
 
 class RecordingError(NoninteractError):
-    """A recorded run cannot be read or written."""
+    """Error for a recording that cannot be read or written."""
 
 
 def one_of(names: Iterable[str], found: str = "") -> str:
-    """Lists the valid names, the closest to what was found first."""
+    """List the valid names, the closest match to `found` first."""
     names = list(names)
     close = get_close_matches(found, names, n=1)
     ordered = close + [name for name in names if name not in close]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Terms that do not change are computed once."""
+"""Cache for terms that stay constant between calls."""
 
 from collections.abc import Callable
 from operator import is_
@@ -9,13 +9,13 @@ Result = TypeVar("Result")
 
 
 class Memo(Generic[Result]):
-    """A function that keeps its last result while its arguments are the very same objects.
+    """Function wrapper that returns its last result while the arguments are the same objects.
 
-    A team of prismatic joints hands out the same M and the same Jacobians at every state, so what
-    follows from them need not be computed again. Nobody may write into such arguments or results.
+    A team of prismatic joints returns the same M and the same Jacobians at every state, so terms
+    derived from them need not be computed again. Arguments and results must not be modified.
 
     Args:
-        function: A function without side effects.
+        function: Function without side effects.
     """
 
     def __init__(self, function: Callable[..., Result]) -> None:
@@ -24,7 +24,7 @@ class Memo(Generic[Result]):
         self._result: Result
 
     def __call__(self, *arguments: Any) -> Result:
-        """The result for these arguments."""
+        """Return the result for these arguments, computed only if one of them is a new object."""
         if self._arguments is None or not all(map(is_, self._arguments, arguments)):
             self._result = self._function(*arguments)
             self._arguments = arguments

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Configuration blocks: frozen dataclasses whose fields carry type, range and meaning.
+"""Configuration blocks: frozen dataclasses whose fields declare type, range and meaning.
 
-A block is read from a mapping with `load`; the same field metadata describes the ROS parameter,
-so that a key, its range and its documentation have one home.
+`load` reads a block from a mapping. The same field metadata describes the ROS parameter, so each
+key, its range and its documentation are declared in one place.
 """
 
 import math
@@ -17,15 +17,15 @@ Block = TypeVar("Block")
 
 @dataclass(frozen=True)
 class Key:
-    """What one configuration key means and what it may hold.
+    """Description and constraints of one configuration key.
 
     Attributes:
-        doc: One line for people, with the unit in brackets.
-        minimum: Smallest value of each number, inclusive (exclusive where `strict`).
-        maximum: Largest value of each number, inclusive.
-        strict: Whether `minimum` itself is refused.
-        choices: Names that a string may take; any, where empty.
-        live: Whether the parameter may be changed while the program runs.
+        doc: Description for users: a noun phrase with the unit in brackets.
+        minimum: Smallest allowed number, inclusive unless `strict`.
+        maximum: Largest allowed number, inclusive.
+        strict: True if `minimum` itself is not allowed.
+        choices: Allowed strings; empty if any string is allowed.
+        live: True if the parameter may be changed while the program runs.
     """
 
     doc: str
@@ -36,7 +36,7 @@ class Key:
     live: bool = False
 
     def numbers_allowed(self) -> str:
-        """The allowed range in words."""
+        """Return the allowed range as text, e.g. `> 0 and <= 10`."""
         low = (
             f"{'>' if self.strict else '>='} {self.minimum:g}" if self.minimum > -math.inf else ""
         )
@@ -54,7 +54,17 @@ def key(
     choices: tuple[str, ...] = (),
     live: bool = False,
 ) -> Any:
-    """Declares one key of a block; without a default the key must be given."""
+    """Declare one key of a block; a key without a default is required.
+
+    Args:
+        doc: Description for users: a noun phrase with the unit in brackets.
+        default: Value if the key is not given.
+        minimum: Smallest allowed number, inclusive.
+        maximum: Largest allowed number, inclusive.
+        positive: True if numbers must be greater than 0.
+        choices: Allowed strings; empty if any string is allowed.
+        live: True if the parameter may be changed while the program runs.
+    """
     low = 0.0 if positive else minimum
     metadata = {"key": Key(doc, low, maximum, positive, choices, live)}
     return field(default=default, metadata=metadata)
@@ -63,13 +73,13 @@ def key(
 def load(
     block: type[Block], values: Mapping[str, Any], path: str = "", ignore: tuple[str, ...] = ()
 ) -> Block:
-    """Builds a block from a mapping and checks every key.
+    """Build a block from a mapping and check every key.
 
     Args:
-        block: Dataclass whose fields were declared with `key`.
-        values: Key to value, as read from a parameter file.
+        block: Dataclass whose fields are declared with `key`.
+        values: Values by key, as read from a parameter file.
         path: Dotted prefix for error messages.
-        ignore: Keys of `values` that belong to somebody else.
+        ignore: Keys of `values` that belong to other blocks.
 
     Raises:
         ScenarioError: A key is unknown, missing, of the wrong type or out of range.
@@ -93,12 +103,12 @@ def load(
 
 
 def keys_of(block: type) -> Iterator[Field]:
-    """The fields of a block that are configuration keys."""
+    """Return the fields of a block that are configuration keys."""
     return (item for item in fields(block) if "key" in item.metadata)
 
 
 def describe(block: Any, path: str = "") -> Iterator[tuple[str, Any, Key, Any]]:
-    """Dotted key, annotated type, rule and value of every key of a block."""
+    """Iterate over dotted key, annotated type, `Key` and value of every key of a block."""
     hints = get_type_hints(type(block))
     for item in keys_of(type(block)):
         rule = item.metadata["key"]
@@ -106,12 +116,16 @@ def describe(block: Any, path: str = "") -> Iterator[tuple[str, Any, Key, Any]]:
 
 
 def join(path: str, name: str) -> str:
-    """Dotted key."""
+    """Return the dotted key of a name within a block."""
     return f"{path}.{name}" if path else str(name)
 
 
 def convert(path: str, value: Any, hint: Any, rule: Key) -> Any:
-    """Checks one value and converts it to the annotated type (int to float, list to tuple)."""
+    """Check one value and convert it to the annotated type (int to float, list to tuple).
+
+    Raises:
+        ScenarioError: The value has the wrong type or is out of range.
+    """
     if hint in (tuple[float, ...], tuple[str, ...]):
         item_type = float if hint == tuple[float, ...] else str
         items = _plain(value)
@@ -136,7 +150,7 @@ def _convert_item(path: str, item: Any, hint: Any, rule: Key, shown: Any) -> Any
 
 
 def _plain(value: Any) -> Any:
-    """Arrays as lists."""
+    """Convert an array to a list; return any other value unchanged."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
@@ -146,7 +160,7 @@ def _show(value: Any) -> str:
 
 
 def type_name(hint: Any) -> str:
-    """The type in words."""
+    """Return the type as text for users."""
     names = {
         float: "a number",
         int: "a whole number",

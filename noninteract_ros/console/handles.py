@@ -8,7 +8,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.console.drive import AXES, IDENTITY_ROTATION, DrivableSubtask
-from noninteract_ros.control.law.impedance import spread
+from noninteract_ros.control.law.impedance import per_coordinate
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.sources.human.input_settings import OperatorSettings
 from noninteract_ros.sources.human.input_shaping import Workspace
@@ -35,7 +35,7 @@ def drivable_subtasks(scenario: Scenario, stack: SubtaskStack) -> dict[str, Driv
             continue
         bounds = scenario.subtasks[task.name].input
         names = ("max_velocity", "max_acceleration", "max_jerk")
-        limits = np.array([spread(task, name, getattr(bounds, name)) for name in names])
+        limits = np.array([per_coordinate(task, name, getattr(bounds, name)) for name in names])
         layout = task.layout
         speed = np.full(layout.dim, settings.linear_speed)
         speed[layout.angular.ravel()] = settings.angular_speed

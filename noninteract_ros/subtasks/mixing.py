@@ -1,24 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a subtask mixes what each robot does for itself, for laws that use that structure.
+"""Structure of a subtask: the combination of the robots' motions, for robot-by-robot laws.
 
-A subtask that declares none is as good as any other; its team's law then costs more.
+A subtask without a declared structure is supported as well; its law is evaluated in dense form,
+at a higher cost.
 """
 
 from dataclasses import dataclass
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.subtasks.parts import Part
+from noninteract_ros.subtasks.components import Component
 from noninteract_ros.subtasks.team_rotation import TeamRotation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeanMixing:
-    """One element: weighted mean of the tool points, mean of the tools' orientations, or both.
+    """One element: weighted mean of the tool points, mean of the tool orientations, or both.
 
     Attributes:
-        axes: Its axes, out of x, y and z.
+        axes: Axes of the position, out of x, y and z.
         weights: Weight of each robot, shape (N,).
-        rotation: The mean orientation; None if it has none.
+        rotation: Mean orientation; None without one.
     """
 
     axes: tuple[str, ...]
@@ -28,21 +29,21 @@ class MeanMixing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EdgeMixing:
-    """An element for each pair of robots: differences of tool points, rotations, or both.
+    """One element per pair of robots: differences of tool points, rotations, or both.
 
     Attributes:
-        axes: Its axes, out of x, y and z.
-        pairs: Places of first and second robot of each pair in the team.
-        rotates: Whether it has the rotations.
+        axes: Axes of the position, out of x, y and z.
+        pairs: Indices of the first and second robot of each pair in the team.
+        rotates: True if the elements have rotations.
         offsets: Constant rotation of each tool, shape (N, 3, 3), or None.
-        frame: Mean orientation that it is seen from; None: the world.
+        frame: Mean orientation that serves as reference frame; None for the world.
     """
 
     axes: tuple[str, ...]
     pairs: tuple[tuple[int, int], ...]
     rotates: bool
     offsets: Array | None
-    frame: Part | None
+    frame: Component | None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,8 +51,8 @@ class JointMixing:
     """Chosen joints.
 
     Attributes:
-        in_q: Place of each in the configuration.
-        in_v: Place of each in the velocity.
+        in_q: Index of each joint in the configuration.
+        in_v: Index of each joint in the velocity.
     """
 
     in_q: tuple[int, ...]

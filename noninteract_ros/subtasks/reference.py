@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a source asks of one subtask at one instant."""
+"""Reference of one subtask at one time."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,8 @@ from noninteract_ros.subtasks.layout import Layout, ValueMotion
 class Reference:
     """Desired motion of one subtask, in its own coordinates (float64, SI units).
 
-    Layouts say which numbers are quaternions; without one, all are plain.
+    Methods with a layout treat its quaternions as rotations; without one, all numbers are
+    scalars.
 
     Attributes:
         position: Desired value xᵈ, shape (size,).
@@ -28,25 +29,25 @@ class Reference:
 
     @classmethod
     def at_rest(cls, position: ArrayLike, layout: Layout | None = None) -> "Reference":
-        """Rest at a position of shape (size,), which is copied."""
-        held = np.array(position, dtype=np.float64)
-        dim = held.size if layout is None else layout.dim
-        return cls(held, np.zeros(dim), np.zeros(dim))
+        """Return a reference at rest at a position, shape (size,), which is copied."""
+        value = np.array(position, dtype=np.float64)
+        dim = value.size if layout is None else layout.dim
+        return cls(value, np.zeros(dim), np.zeros(dim))
 
     def extrapolate(self, dt: float, layout: Layout | None = None) -> "Reference":
-        """The same motion `dt` seconds later, its acceleration held."""
-        return Reference(*(layout or self._plain).extrapolate(self._motion, dt))
+        """Return the motion `dt` seconds later, under constant acceleration."""
+        return Reference(*(layout or self._scalars).extrapolate(self._motion, dt))
 
     def minus(self, base: "Reference", layout: Layout) -> "Reference":
-        """The gap from another motion to this one, all of it of shape (dim,)."""
+        """Return the difference of this motion from another one, all of shape (dim,)."""
         return Reference(*layout.relative_motion(self._motion, base._motion))
 
     def deviation(self, before: "Reference", dt: float, layout: Layout) -> tuple[Array, Array]:
-        """Position and velocity of `self.minus(before.at(dt))`, shape (dim,) each."""
+        """Return position and velocity of `self.minus(before.extrapolate(dt))`, shape (dim,)."""
         return layout.deviation(self._motion, before._motion, dt)
 
     def plus(self, gap: "Reference", layout: Layout) -> "Reference":
-        """The motion that a gap, all of it of shape (dim,), leads away from this one."""
+        """Return this motion composed with a difference, all of shape (dim,)."""
         return Reference(*layout.compose_motion(self._motion, gap._motion))
 
     @property
@@ -54,5 +55,5 @@ class Reference:
         return self.position, self.velocity, self.acceleration
 
     @property
-    def _plain(self) -> Layout:
+    def _scalars(self) -> Layout:
         return Layout.scalars(self.position.size)

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rotations: quaternions (x, y, z, w), rotation vectors and their differentials.
+"""Rotations on SO(3): quaternions (x, y, z, w), rotation vectors and their differentials.
 
-Every function takes any leading dimensions, so that all elements are worked off at once, and is
-exact near zero, where series replace the closed forms. Angular velocities are those of a matrix R
-with dR/dt = [omega] R, in the axes that R leads to. For R = exp(phi)
+All functions accept any leading dimensions, and are exact near zero, where series replace the
+closed forms. The angular velocity omega of a matrix R satisfies dR/dt = [omega] R, in the axes
+that R maps to. For R = exp(phi)
 
     omega = A(phi) dphi/dt,    A = 1 + a [phi] + b [phi]^2,    A^-1 = 1 - [phi] / 2 + c [phi]^2
 
 with a = (1 - cos t) / t^2, b = (t - sin t) / t^3, c = (1 - (t / 2) cot(t / 2)) / t^2, t = |phi|.
-A phi = A' phi = phi: that is why half the squared angle has the rotation vector as its gradient.
+Since A phi = A' phi = phi, the gradient of half the squared angle is the rotation vector.
 """
 
 import math
@@ -20,16 +20,16 @@ from scipy.special import bernoulli
 
 from noninteract_ros.arrays import Array
 
-# Twelve terms leave less than rounding where t < 1.
+# The remainder after twelve terms is below rounding for t < 1.
 _TERMS = range(12)
 _POWERS = np.arange(float(len(_TERMS)))
 
 
 class Coefficient:
-    """An even function f of the angle t, exact at any angle below 2 pi.
+    """Even function f of the angle t, exact at any angle below 2 pi.
 
     Args:
-        series: Coefficients of its power series in t^2.
+        series: Coefficients of the power series in t^2.
         value: f(t) for t >= 1.
         slope: (df/dt) / t for t >= 1.
     """
@@ -45,11 +45,11 @@ class Coefficient:
         self.slope_series = 2.0 * _POWERS[1:] * self.series[1:]
 
     def value(self, phi: Array) -> Array:
-        """f(|phi|), shape (..., 1, 1)."""
+        """Return f(|phi|), shape (..., 1, 1)."""
         return self._at(phi, self.series, self._value)
 
     def slope(self, phi: Array, phi_rate: Array) -> Array:
-        """df/dt along a motion of phi, shape (..., 1, 1)."""
+        """Return df/dt along a motion of phi, shape (..., 1, 1)."""
         along = (phi * phi_rate).sum(axis=-1)[..., None, None]
         return along * self._at(phi, self.slope_series, self._slope)
 
@@ -94,20 +94,20 @@ _IDENTITY = np.eye(3)
 
 
 def hat(w: Array) -> Array:
-    """Matrix [w] with [w] u = w x u, shape (..., 3, 3)."""
+    """Return the matrix [w] with [w] u = w x u, shape (..., 3, 3)."""
     return (w @ _GENERATORS).reshape(*w.shape, 3)
 
 
 def exp(phi: Array) -> Array:
-    """Unit quaternion of a rotation vector [rad], shape (..., 4)."""
+    """Return the unit quaternion of a rotation vector [rad], shape (..., 4)."""
     angle = np.sqrt((phi * phi).sum(axis=-1, keepdims=True))
     return np.concatenate([0.5 * np.sinc(angle / (2.0 * np.pi)) * phi, np.cos(0.5 * angle)], -1)
 
 
 def log(q: Array) -> Array:
-    """Shortest rotation vector of a quaternion of either sign [rad], shape (..., 3).
+    """Return the shortest rotation vector of a quaternion of either sign [rad], shape (..., 3).
 
-    Its length is at most pi, which is where it jumps to the other side.
+    Its length is at most pi, where it jumps to the opposite vector.
     """
     vector, scalar = q[..., :3], q[..., 3:]
     size = np.sqrt((vector * vector).sum(axis=-1, keepdims=True))
@@ -118,55 +118,55 @@ def log(q: Array) -> Array:
 
 
 def product(p: Array, q: Array) -> Array:
-    """Quaternion of the rotation q followed by p, shape (..., 4)."""
+    """Return the quaternion of the rotation q followed by p, shape (..., 4)."""
     from_left = (p @ _LEFT).reshape(*p.shape, 4)
     return (from_left @ q[..., None])[..., 0]
 
 
 def inverse(q: Array) -> Array:
-    """Quaternion of the opposite rotation, for a unit one, shape (..., 4)."""
+    """Return the inverse of a unit quaternion, shape (..., 4)."""
     return q * np.array([-1.0, -1.0, -1.0, 1.0])
 
 
 def normalized(q: Array) -> Array:
-    """The quaternion at unit length, shape (..., 4)."""
+    """Return the quaternion at unit length, shape (..., 4)."""
     return q / np.sqrt((q * q).sum(axis=-1, keepdims=True))
 
 
 def matrix(q: Array) -> Array:
-    """Rotation matrix of a unit quaternion, shape (..., 3, 3)."""
+    """Return the rotation matrix of a unit quaternion, shape (..., 3, 3)."""
     cross = hat(q[..., :3])
     return _IDENTITY + 2.0 * (q[..., 3, None, None] * cross + cross @ cross)
 
 
 def quaternion(R: Array) -> Array:
-    """Unit quaternion of a rotation matrix with w >= 0, shape (..., 4)."""
+    """Return the unit quaternion of a rotation matrix with w >= 0, shape (..., 4)."""
     rows = [pin.Quaternion(matrix).coeffs() for matrix in R.reshape(-1, 3, 3)]
     q = normalized(np.array(rows)).reshape(*R.shape[:-2], 4)
     return np.where(q[..., 3:] < 0.0, -q, q)
 
 
 def jacobian(phi: Array) -> Array:
-    """A(phi), shape (..., 3, 3): angular velocity of exp(phi) per rate of phi."""
+    """Return A(phi), shape (..., 3, 3): angular velocity of exp(phi) per rate of phi."""
     cross = hat(phi)
     return _IDENTITY + ANGLE_A.value(phi) * cross + ANGLE_B.value(phi) * (cross @ cross)
 
 
 def jacobian_rate(phi: Array, phi_rate: Array) -> Array:
-    """dA/dt along a motion of phi, shape (..., 3, 3)."""
+    """Return dA/dt along a motion of phi, shape (..., 3, 3)."""
     cross, cross_rate = hat(phi), hat(phi_rate)
     linear = ANGLE_A.slope(phi, phi_rate) * cross + ANGLE_A.value(phi) * cross_rate
     return linear + _squared_rate(ANGLE_B, phi, phi_rate, cross, cross_rate)
 
 
 def inverse_jacobian(phi: Array) -> Array:
-    """A(phi)^-1, shape (..., 3, 3); it is bounded up to |phi| = pi and singular at 2 pi."""
+    """Return A(phi)^-1, shape (..., 3, 3), bounded up to |phi| = pi and singular at 2 pi."""
     cross = hat(phi)
     return _IDENTITY - 0.5 * cross + ANGLE_C.value(phi) * (cross @ cross)
 
 
 def inverse_jacobian_rate(phi: Array, phi_rate: Array) -> Array:
-    """d(A^-1)/dt along a motion of phi, shape (..., 3, 3)."""
+    """Return d(A^-1)/dt along a motion of phi, shape (..., 3, 3)."""
     cross, cross_rate = hat(phi), hat(phi_rate)
     return _squared_rate(ANGLE_C, phi, phi_rate, cross, cross_rate) - 0.5 * cross_rate
 
@@ -174,7 +174,7 @@ def inverse_jacobian_rate(phi: Array, phi_rate: Array) -> Array:
 def _squared_rate(
     factor: Coefficient, phi: Array, phi_rate: Array, cross: Array, cross_rate: Array
 ) -> Array:
-    """Rate of f [phi]^2."""
+    """Return the time derivative of f [phi]^2."""
     mixed = cross_rate @ cross
     square_rate = mixed + np.swapaxes(mixed, -1, -2)
     return factor.slope(phi, phi_rate) * (cross @ cross) + factor.value(phi) * square_rate

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""All subtasks of a team stacked: equation (6) and assumptions 1 to 3."""
+"""Stack of all subtasks of a team: equation (6) and assumptions 1 to 3."""
 
 from collections.abc import Sequence
 
@@ -16,17 +16,18 @@ _RANK_TRIALS = 4
 
 
 class SubtaskStack:
-    """The outputs of the whole team; together they leave no internal dynamics.
+    """Stacked outputs of the whole team, which leave no internal dynamics.
 
     Args:
         team: The robots.
-        subtasks: Subtasks with different names, whose coordinates add up to the team's.
+        subtasks: Subtasks with different names, whose dimensions add up to that of the team.
 
     Attributes:
-        names: Names of the subtasks, in order.
-        layout: Layout of all values, one after the other.
-        slices: Coordinates of each subtask in a stacked velocity, error or force.
-        value_slices: Numbers of each subtask in a stacked value.
+        subtasks: Subtasks, in order.
+        names: Names of the subtasks.
+        layout: Layout of the stacked value.
+        slices: Slice of each subtask in a stacked velocity, error or force.
+        value_slices: Slice of each subtask in a stacked value.
 
     Raises:
         SubtaskError: Assumption 1, 2 or 3 does not hold; the text gives the dimensions.
@@ -36,13 +37,13 @@ class SubtaskStack:
         self.subtasks = tuple(subtasks)
         self.names = tuple(subtask.name for subtask in subtasks)
         if len(set(self.names)) != len(self.names):
-            raise SubtaskError(f"each subtask needs a name of its own, found {list(self.names)}")
+            raise SubtaskError(f"each subtask needs a unique name, found {list(self.names)}")
         self._check_count(team.n)
         self.layout = Layout.joined([subtask.layout for subtask in subtasks])
         self.slices = _slices([subtask.dim for subtask in subtasks])
         self.value_slices = _slices([subtask.size for subtask in subtasks])
         self._stacked, self._stacked_rate = Memo(_stack), Memo(_stack)
-        self._bounded = [
+        self._singular = [
             task
             for task in self.subtasks
             if type(task).singularity_distance is not Subtask.singularity_distance
@@ -50,7 +51,7 @@ class SubtaskStack:
         self._check_rank(team)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
-        """Stacked value (size,), Jacobian (n, n) and Jacobian rate (n, n)."""
+        """Return stacked value (size,), Jacobian (n, n) and Jacobian rate (n, n)."""
         parts = [subtask.evaluate(state) for subtask in self.subtasks]
         return SubtaskState(
             np.concatenate([part.x for part in parts]),
@@ -59,15 +60,18 @@ class SubtaskStack:
         )
 
     def singularity_distance(self, state: TeamState) -> float:
-        """Least `Subtask.singularity_distance` of all, 1 where none has places without a value."""
-        return min((task.singularity_distance(state) for task in self._bounded), default=1.0)
+        """Return the least `Subtask.singularity_distance`; 1 if no subtask has singular states."""
+        return min((task.singularity_distance(state) for task in self._singular), default=1.0)
 
     def difference(self, x: Array, x_d: Array) -> Array:
-        """Error of stacked values towards others, shape (n,); see `Layout.difference`."""
+        """Return the error of stacked values with respect to others, shape (n,).
+
+        See `Layout.difference`.
+        """
         return self.layout.difference(x, x_d)
 
     def _check_count(self, n: int) -> None:
-        """Assumption 2; fewer coordinates would leave internal dynamics, assumption 1."""
+        """Check assumption 2; fewer coordinates would leave internal dynamics, assumption 1."""
         total = sum(subtask.dim for subtask in self.subtasks)
         if total == n:
             return
@@ -82,7 +86,7 @@ class SubtaskStack:
         return self.evaluate(team.state(team.integrate(team.q0, step), np.zeros(team.n))).J
 
     def _check_rank(self, team: Team) -> None:
-        """Assumption 3, structurally: full rank at one configuration at least."""
+        """Check assumption 3 structurally: full rank at one configuration at least."""
         rng = np.random.default_rng(0)
         steps = [np.zeros(team.n), *rng.uniform(-0.5, 0.5, (_RANK_TRIALS, team.n))]
         Js = [self._jacobian(team, step) for step in steps]

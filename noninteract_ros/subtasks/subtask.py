@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a subtask is: definition 1, equations (4) to (6)."""
+"""Interface of a subtask: definition 1, equations (4) to (6)."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.subtasks.components import Component
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.mixing import Mixing
-from noninteract_ros.subtasks.parts import Part
 from noninteract_ros.team.team import TeamState
 
 
@@ -20,8 +20,8 @@ class SubtaskState:
 
     Attributes:
         x: Value phi(q), shape (size,).
-        J: Jacobian, shape (p, n): dx/dt = J v, of rotations the angular velocity.
-        J_rate: Its time derivative along the motion, shape (p, n).
+        J: Jacobian, shape (p, n): dx/dt = J v, with the angular velocity for rotations.
+        J_rate: Time derivative of the Jacobian, shape (p, n).
     """
 
     x: Array
@@ -30,22 +30,22 @@ class SubtaskState:
 
 
 class Subtask(ABC):
-    """A smooth map from the team's configuration to the coordinates of one goal.
+    """Smooth map from the team's configuration to the coordinates of one goal.
 
-    A value runs over the elements; each has its positions along the axes and then, where the
-    subtask rotates, a quaternion (x, y, z, w), whose velocity is the angular velocity.
+    A value lists the elements; each has its positions along the axes, followed by a quaternion
+    (x, y, z, w) if the subtask rotates. The velocity of a quaternion is the angular velocity.
 
     Attributes:
-        name: Name in the scenario; prefixes its topics.
-        elements: Names of the bodies or edges that its messages list, in order.
-        axes: Axes, out of x, y and z, that each element has.
-        rotates: Whether each element has a rotation.
-        angles: Whether positions are angles [rad]: those a whole turn apart are the same.
-        frame: Orientation of the team that other subtasks can be seen from, or None; its
-            `evaluate` returns one rotation with its differentials, see `parts.Rows`.
-        mixing: How it mixes what each robot does, or None; see `mixing`.
-        dim: Number of coordinates p of a velocity.
-        size: Number of numbers of a value.
+        name: Name in the scenario; prefix of the topics.
+        elements: Names of the bodies or edges in messages, in order.
+        axes: Axes of each element, out of x, y and z.
+        rotates: True if each element has a rotation.
+        angles: True if positions are angles [rad], equal up to full turns.
+        frame: Orientation of the team that other subtasks can use as reference frame, or None; a
+            component with one rotation.
+        mixing: Structure of the subtask, see `mixing`; None if undeclared.
+        dim: Dimension p of a velocity.
+        size: Dimension of a value.
     """
 
     name: str
@@ -53,12 +53,12 @@ class Subtask(ABC):
     axes: tuple[str, ...]
     rotates: bool = False
     angles: bool = False
-    frame: Part | None = None
+    frame: Component | None = None
     mixing: Mixing | None = None
 
     @cached_property
     def layout(self) -> Layout:
-        """Which numbers of a value are positions and which are quaternions."""
+        """Layout of a value: positions and quaternions."""
         count = len(self.elements)
         return Layout((len(self.axes),) * count, (self.rotates,) * count, (self.angles,) * count)
 
@@ -69,15 +69,15 @@ class Subtask(ABC):
 
     @cached_property
     def units(self) -> tuple[str, ...]:
-        """Unit of each coordinate, shape (p,): errors of rotations are angles."""
+        """Unit of each coordinate of an error, shape (p,); rad for rotations."""
         units = np.full(self.dim, "rad")
         units[self.layout.rates] = np.repeat(self.element_units, len(self.axes))
         return tuple(units.tolist())
 
     def magnitudes(self, e: Array) -> dict[str, Array]:
-        """Sizes of errors e, shape (..., p), by unit, shape (..., k) each.
+        """Return the magnitudes of errors e, shape (..., p), by unit, shape (..., k) each.
 
-        Of each element with positions their Euclidean norm, of each rotation its angle.
+        The magnitude is the Euclidean norm of an element's positions, and the angle of a rotation.
         """
         lengths = e[..., self.layout.rates].reshape(*e.shape[:-1], -1, max(1, len(self.axes)))
         angles = np.linalg.norm(e[..., self.layout.angular], axis=-1)
@@ -86,31 +86,31 @@ class Subtask(ABC):
             norms, units = np.linalg.norm(lengths, axis=-1), np.array(self.element_units)
             found = {unit: norms[..., units == unit] for unit in ("m", "rad") if unit in units}
         if self.rotates:
-            found["rad"] = angles  # A subtask that rotates has no positions that are angles.
+            found["rad"] = angles  # A subtask with rotations has no angles as positions.
         return found
 
     @property
     def dim(self) -> int:
-        """Number of coordinates of a velocity."""
+        """Dimension of a velocity."""
         return self.layout.dim
 
     @property
     def size(self) -> int:
-        """Number of numbers of a value."""
+        """Dimension of a value."""
         return self.layout.size
 
     def difference(self, x: Array, x_d: Array) -> Array:
-        """Error of a value towards another, shape (p,): x - x_d, for rotations log(R R_d')."""
+        """Return the error of a value, shape (p,): x - x_d, for rotations log(R R_d')."""
         return self.layout.difference(x, x_d)
 
     @abstractmethod
     def evaluate(self, state: TeamState) -> SubtaskState:
-        """Value, Jacobian and Jacobian rate at a state of the team."""
+        """Return value, Jacobian and Jacobian rate at a state of the team."""
 
     def singularity_distance(self, state: TeamState) -> float:
-        """How far the state is from places where the value is not defined: there 0, at most 1.
+        """Return the distance from states without a defined value: 0 there, at most 1.
 
-        A Jacobian that grows beyond bounds there hides from the regularity of the stack; so the
-        law fades out by this measure, too.
+        The regularity of the stack does not reveal a Jacobian that grows without bound there;
+        therefore the law also fades out by this measure.
         """
         return 1.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One number per joint, as people and messages have it, and Pinocchio's configuration."""
+"""Conversion between joint positions, as in messages, and Pinocchio configurations."""
 
 import numpy as np
 import pinocchio as pin
@@ -9,53 +9,53 @@ from noninteract_ros.arrays import Array
 
 
 class JointCoordinates:
-    """Converts joint positions, shape (n,), to a configuration, shape (nq,), and back.
+    """Conversion of joint positions, shape (n,), to a configuration, shape (nq,), and back.
 
-    A continuous joint turns without end: its position is an angle, any one in and one within
-    (-pi, pi] out, while its configuration is the angle's cosine and sine. All other joints have
-    the same number in both; of a model without continuous joints, arrays pass as they are.
+    The configuration of a continuous joint is the cosine and sine of its angle. Its position is
+    the angle: any value as input, a value within (-pi, pi] as output. All other joints have the
+    same number in both. Without continuous joints, arrays are returned unchanged.
 
     Args:
-        model: Joints of one degree of freedom each.
+        model: Model whose joints have one degree of freedom each.
     """
 
     def __init__(self, model: pin.Model) -> None:
         joints = list(model.joints)[1:]
         self._model = model
-        self._straight = all(joint.nq == 1 for joint in joints)
-        self._plain = _indices([joint for joint in joints if joint.nq == 1])
-        self._turning = _indices([joint for joint in joints if joint.nq == 2])
+        self._euclidean = all(joint.nq == 1 for joint in joints)
+        self._scalar = _indices([joint for joint in joints if joint.nq == 1])
+        self._continuous = _indices([joint for joint in joints if joint.nq == 2])
 
     def configuration(self, positions: Array) -> Array:
-        """Configuration of joint positions."""
-        if self._straight:
+        """Return the configuration, shape (nq,), of joint positions, shape (n,)."""
+        if self._euclidean:
             return positions
         q = np.empty(self._model.nq)
-        places, joints = self._plain
-        q[places] = positions[joints]
-        places, joints = self._turning
-        q[places] = np.cos(positions[joints])
-        q[places + 1] = np.sin(positions[joints])
+        in_q, in_v = self._scalar
+        q[in_q] = positions[in_v]
+        in_q, in_v = self._continuous
+        q[in_q] = np.cos(positions[in_v])
+        q[in_q + 1] = np.sin(positions[in_v])
         return q
 
     def positions(self, q: Array) -> Array:
-        """Joint positions of a configuration."""
-        if self._straight:
+        """Return the joint positions, shape (n,), of a configuration, shape (nq,)."""
+        if self._euclidean:
             return q
         positions = np.empty(self._model.nv)
-        places, joints = self._plain
-        positions[joints] = q[places]
-        places, joints = self._turning
-        angles = np.arctan2(q[places + 1], q[places])
-        positions[joints] = np.where(angles == -np.pi, np.pi, angles)
+        in_q, in_v = self._scalar
+        positions[in_v] = q[in_q]
+        in_q, in_v = self._continuous
+        angles = np.arctan2(q[in_q + 1], q[in_q])
+        positions[in_v] = np.where(angles == -np.pi, np.pi, angles)
         return positions
 
     def difference(self, start: Array, end: Array) -> Array:
-        """Shortest way from one configuration to another, shape (n,)."""
-        return end - start if self._straight else pin.difference(self._model, start, end)
+        """Return the shortest tangent vector from one configuration to another, shape (n,)."""
+        return end - start if self._euclidean else pin.difference(self._model, start, end)
 
 
 def _indices(joints: list[pin.JointModel]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Where joints stand in the configuration and in the velocity."""
-    places = np.array([joint.idx_q for joint in joints], dtype=np.intp)
-    return places, np.array([joint.idx_v for joint in joints], dtype=np.intp)
+    """Return the indices of joints in the configuration and in the velocity."""
+    in_q = np.array([joint.idx_q for joint in joints], dtype=np.intp)
+    return in_q, np.array([joint.idx_v for joint in joints], dtype=np.intp)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What joints can do and what resists them: limits, friction, armature."""
+"""Joint settings of a robot: limits, friction, armature."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,28 +13,30 @@ from noninteract_ros.schema import join, key
 from noninteract_ros.team.joint_coordinates import JointCoordinates
 from noninteract_ros.team.robot_topics import RobotTopics
 
-ROUNDING = 1e-9  # [m or rad] by which a position may pass a limit.
+ROUNDING = 1e-9  # [m or rad] tolerance of position limits
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointSettings(RobotTopics):
-    """Keys that every robot has for its joints: one number for all, or one per joint.
+    """Joint keys common to all robots: each has one number for all joints, or one per joint.
 
-    Friction acts in the simulation alone. The controller does not know it, as it does not know
-    that of a real joint: to the law it is an external torque, and a passive one.
+    Friction acts in the simulation only. The controller does not know it, as it does not know
+    the friction of a real joint: for the law it is a passive external torque.
     """
 
     effort_limit: tuple[float, ...] = key(
-        "Largest torque [N or N m]; by default the model's own, or none", (), positive=True
+        "Effort limit [N or N m]; by default the limit of the model, if any", (), positive=True
     )
     velocity_limit: tuple[float, ...] = key(
-        "Largest speed [m/s or rad/s]; by default the model's own, or none", (), positive=True
+        "Velocity limit [m/s or rad/s]; by default the limit of the model, if any",
+        (),
+        positive=True,
     )
     lower_limit: tuple[float, ...] = key(
-        "Lowest position [m or rad]; by default the model's own, or none", ()
+        "Lower position limit [m or rad]; by default the limit of the model, if any", ()
     )
     upper_limit: tuple[float, ...] = key(
-        "Highest position [m or rad]; by default the model's own, or none", ()
+        "Upper position limit [m or rad]; by default the limit of the model, if any", ()
     )
     friction: tuple[float, ...] = key(
         "Viscous friction of the simulated joints [N s/m or N m s/rad]; by default none",
@@ -42,15 +44,19 @@ class JointSettings(RobotTopics):
         minimum=0.0,
     )
     armature: tuple[float, ...] = key(
-        "Inertia of the rotor, seen at the joint [kg or kg m^2]; by default none", (), minimum=0.0
+        "Rotor inertia reflected to the joint [kg or kg m^2]; by default none", (), minimum=0.0
     )
 
     def apply_to(self, name: str, model: pin.Model) -> None:
-        """Puts what is given into a robot's model.
+        """Write the given limits, friction and armature into a robot's model.
+
+        Args:
+            name: Name of the robot, for error messages.
+            model: Model of the robot, which is modified.
 
         Raises:
-            ScenarioError: A list has another length, a limit does not fit, or a joint moves no
-                mass, or its topics do not fit.
+            ScenarioError: A list has the wrong length, limits contradict each other, or the topics
+                do not fit the joints.
         """
         self.check_topics(name, joint_names(model))
         nothing = np.zeros(model.nv)
@@ -87,15 +93,20 @@ class JointSettings(RobotTopics):
 
 
 def joint_names(model: pin.Model) -> list[str]:
-    """Names of the joints that move."""
+    """Return the names of the joints of a model, without the universe."""
     return list(model.names)[1:]
 
 
 def per_joint(key: str, values: Sequence[float], joints: Sequence[str]) -> Array:
-    """Numbers for each joint, from one for all or one per joint.
+    """Expand one number for all joints, or one per joint, to shape (n,).
+
+    Args:
+        key: Full key, for error messages.
+        values: One number, or one per joint.
+        joints: Names of the joints.
 
     Raises:
-        ScenarioError: Any other count.
+        ScenarioError: The count is neither 1 nor the number of joints.
     """
     if len(values) not in (1, len(joints)):
         allowed = f"1 number, or {len(joints)}: one per joint {list(joints)}"
@@ -106,13 +117,13 @@ def per_joint(key: str, values: Sequence[float], joints: Sequence[str]) -> Array
 def configuration_within(
     key: str, values: Sequence[float], model: pin.Model, limits: Array
 ) -> Array:
-    """Configuration of joint positions that respect limits, shape (nq,); by default zeros.
+    """Return the configuration, shape (nq,), of joint positions within limits.
 
     Args:
-        key: Full key, for errors.
-        values: Position of each joint [m or rad].
-        model: The robot.
-        limits: Lowest and highest positions, shape (2, nv).
+        key: Full key, for error messages.
+        values: Position of each joint [m or rad]; empty for zeros.
+        model: Model of the robot.
+        limits: Lower and upper positions, shape (2, nv).
 
     Raises:
         ScenarioError: The count is wrong, or a joint is beyond its limits.

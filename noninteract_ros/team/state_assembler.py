@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One state of the team from states that its robots told at different times."""
+"""Assembly of one team state from robot states with different stamps."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,15 +15,15 @@ SECOND = 10**9
 
 @dataclass(frozen=True, slots=True)
 class AssembledState:
-    """All joints at one time.
+    """State of all joints at one time.
 
     Attributes:
-        stamp_ns: The time: the newest that any joint was told of [ns].
-        position: Shape (n,) [m or rad].
-        velocity: Shape (n,) [m/s or rad/s].
-        effort: Shape (n,) [N or N m]; NaN where none was told.
-        ages: How much older each joint's own state is, shape (n,) [s].
-        late: Joints whose state is too old to be carried on, shape (n,).
+        stamp_ns: Newest stamp of all joints [ns].
+        position: Positions at the stamp, shape (n,) [m or rad].
+        velocity: Velocities at the stamp, shape (n,) [m/s or rad/s].
+        effort: Measured efforts, shape (n,) [N or N m]; NaN where unknown.
+        ages: Age of each joint's own state at the stamp, shape (n,) [s].
+        late: True for joints whose state is too old for a prediction, shape (n,).
     """
 
     stamp_ns: int
@@ -35,21 +35,21 @@ class AssembledState:
 
 
 class StateAssembler:
-    """Keeps the newest of each joint and brings all to the newest time among them.
+    """Prediction of all joints to the newest stamp among their latest states.
 
-    Over an age d a joint is carried on with constant velocity: q + v d, v. With accelerations
-    below a_max that is wrong by at most a_max d^2 / 2 in position and a_max d in velocity. With
-    constant acceleration, which is measured as the last difference of velocities over its time h:
-    q + v d + a d^2 / 2, v + a d; with a rate of acceleration below j_max that is wrong by at most
-    j_max (d^3 / 6 + h d^2 / 4) and j_max (d^2 + h d) / 2, but noise in velocities grows by
-    1 + 2 d / h. At age 0 nothing is changed, to the bit.
+    Over an age d, prediction by constant velocity gives q + v d and v. For accelerations below
+    a_max, its error is at most a_max d^2 / 2 in position and a_max d in velocity. Prediction by
+    constant acceleration gives q + v d + a d^2 / 2 and v + a d, with a measured as the last
+    difference of velocities over its time h. For jerks below j_max, its error is at most
+    j_max (d^3 / 6 + h d^2 / 4) and j_max (d^2 + h d) / 2, but velocity noise is amplified by
+    1 + 2 d / h. At age 0 states are returned unchanged, to the bit.
 
-    A joint that is older than `max_skew` is not carried on: it is taken to rest where it was.
+    A joint older than `max_skew` is not predicted: its last position is used, with velocity zero.
 
     Args:
         names: Joints of the team.
-        prediction: One of `PREDICTIONS`.
-        max_skew: Largest age that is bridged [s].
+        prediction: Quantity that is assumed constant, one of `PREDICTIONS`.
+        max_skew: Largest age that is predicted over [s].
     """
 
     def __init__(self, names: Sequence[str], prediction: str, max_skew: float) -> None:
@@ -69,20 +69,20 @@ class StateAssembler:
         velocity: Array,
         effort: Array | None = None,
     ) -> None:
-        """Takes what some joints were at a time.
+        """Store the latest state of some joints.
 
         Args:
-            joints: Places of m joints in the team's order.
-            stamp_ns: The time [ns].
-            position: Shape (m,).
-            velocity: Shape (m,).
-            effort: Shape (m,), NaN where unknown; None, where none is.
+            joints: Indices of m joints in the team's order.
+            stamp_ns: Stamp of the state [ns].
+            position: Positions, shape (m,) [m or rad].
+            velocity: Velocities, shape (m,) [m/s or rad/s].
+            effort: Efforts, shape (m,) [N or N m], NaN where unknown; None if all are unknown.
         """
         elapsed = (stamp_ns - self._stamps[joints]) / SECOND
         measurable = (elapsed > 0.0) & (elapsed <= self._max_skew)
         change = velocity - self._v[joints]
         rate = np.divide(change, elapsed, out=np.zeros_like(change), where=measurable)
-        # A state that is told again tells nothing new of the acceleration.
+        # A repeated state has no information about the acceleration.
         self._a[joints] = np.where(elapsed == 0.0, self._a[joints], rate)
         self._q[joints], self._v[joints] = position, velocity
         self._effort[joints] = np.nan if effort is None else effort
@@ -90,27 +90,27 @@ class StateAssembler:
         self._fresh[joints] = True
 
     def reset(self, joints: NDArray[np.intp]) -> None:
-        """Forgets joints whose clock starts anew."""
+        """Discard the states of joints, e.g. after a restart of their clock."""
         self._stamps[joints], self._fresh[joints] = -1, False
         self._a[joints] = 0.0
 
     @property
     def missing(self) -> list[str]:
-        """Joints of which nothing was told so far."""
+        """Joints without a state."""
         return [self.names[joint] for joint in np.flatnonzero(self._stamps < 0)]
 
     @property
     def ready(self) -> bool:
-        """Whether every joint is known, and something was told since the last assembly."""
+        """True if every joint has a state, at least one of them new since the last assembly."""
         return bool(self._fresh.any() and self._stamps.min() >= 0)
 
     @property
     def simultaneous(self) -> bool:
-        """Whether all joints were told of since the last assembly, and of the same time."""
+        """True if all joints have a new state since the last assembly, with the same stamp."""
         return bool(self._fresh.all() and self._stamps.min() == self._stamps.max())
 
     def assemble(self) -> AssembledState:
-        """The team at the newest time that was told; every joint has to be known."""
+        """Return the state of the team at the newest stamp; requires a state of every joint."""
         newest = int(self._stamps.max())
         ages = (newest - self._stamps) / SECOND
         late = ages > self._max_skew
@@ -123,4 +123,11 @@ class StateAssembler:
             if self._accelerated:
                 q += 0.5 * self._a * d**2
                 v += self._a * d
-        return AssembledState(newest, q, v, self._effort.copy(), ages, late)
+        return AssembledState(
+            stamp_ns=newest,
+            position=q,
+            velocity=v,
+            effort=self._effort.copy(),
+            ages=ages,
+            late=late,
+        )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A robot team as one Pinocchio model: equations (1) to (3)."""
+"""Robot team as one Pinocchio model: equations (1) to (3)."""
 
 from collections.abc import Sequence
 from copy import copy
@@ -20,7 +20,7 @@ PRISMATIC = ("JointModelPX", "JointModelPY", "JointModelPZ", "JointModelPrismati
 
 @dataclass(frozen=True, slots=True)
 class TeamState:
-    """Everything the law needs to know of the team at one state (q, v).
+    """Dynamics and tool kinematics of the team at one state (q, v).
 
     Attributes:
         q: Configuration, shape (nq,).
@@ -29,8 +29,8 @@ class TeamState:
         C: Coriolis matrix, shape (n, n); dM/dt - 2 C is skew.
         g: Gravity torque, shape (n,) [N or N m].
         tool_positions: Tool points in the world, shape (N, 3) [m].
-        tool_jacobians: Tool twists (linear, angular) in world axes per v, shape (N, 6, n).
-        tool_jacobian_rates: Their time derivatives, shape (N, 6, n).
+        tool_jacobians: Tool Jacobians (linear, angular) in world axes, shape (N, 6, n).
+        tool_jacobian_rates: Time derivatives of the tool Jacobians, shape (N, 6, n).
         tool_rotations: Tool orientations in the world, shape (N, 3, 3).
     """
 
@@ -53,19 +53,24 @@ class Team:
         gravity: Gravitational acceleration in the world, shape (3,) [m/s^2].
 
     Attributes:
-        n: Number of velocities, which is that of the joints.
+        robots: Robots, in order.
+        names: Names of the robots.
+        model: Pinocchio model of the whole team.
+        n: Dimension of the velocity, equal to the number of joints.
+        joint_names: Names of the joints.
         q0: Initial configuration, shape (nq,).
-        effort_limits: Largest torque of each joint, shape (n,) [N or N m]; inf where none.
-        velocity_limits: Largest speed of each joint, shape (n,) [m/s or rad/s]; inf where none.
-        position_limits: Lowest and highest joint positions, shape (2, n) [m or rad].
-        friction: Viscous friction of the joints, shape (n,) [N s/m or N m s/rad]; M, C and g do
-            not have it.
-        brake_damping: Damping of the robots' own brakes, shape (n,) [N s/m or N m s/rad].
+        velocity_slices: Slice of each robot in a velocity.
+        effort_limits: Effort limits, shape (n,) [N or N m]; inf where unlimited.
+        velocity_limits: Velocity limits, shape (n,) [m/s or rad/s]; inf where unlimited.
+        position_limits: Lower and upper position limits, shape (2, n) [m or rad].
+        friction: Viscous friction of the joints, shape (n,) [N s/m or N m s/rad]; not part of
+            M, C and g.
+        brake_damping: Damping of the robots' brakes, shape (n,) [N s/m or N m s/rad].
         units: Unit of each coordinate of a velocity, m or rad, shape (n,).
-        prismatic: Whether all joints are, so that nothing but the positions changes.
+        prismatic: True if all joints are prismatic; only tool positions then depend on q.
 
     Raises:
-        TeamError: Fewer than two robots, or a name twice.
+        TeamError: Fewer than two robots, or a repeated name.
     """
 
     def __init__(
@@ -75,7 +80,7 @@ class Team:
         if len(robots) < 2:
             raise TeamError(f"a team has at least 2 robots, found {len(robots)}: {names}")
         if len(set(names)) != len(names):
-            raise TeamError(f"each robot needs a name of its own, found {names}")
+            raise TeamError(f"each robot needs a unique name, found {names}")
         self.robots = tuple(robots)
         self.names = tuple(names)
         self.model = _join(robots)
@@ -95,7 +100,7 @@ class Team:
         self._data = self.model.createData()
         self._tools = [self.model.getFrameId(f"{r.name}/{r.tool_frame}") for r in robots]
         self._lower = np.tri(self.n, k=-1, dtype=bool)
-        joints = self.model.joints[1:]  # The first is the universe.
+        joints = self.model.joints[1:]  # Without the universe.
         self.prismatic = all(joint.shortname() in PRISMATIC for joint in joints)
         self.units = tuple(
             "m" if joint.shortname() in PRISMATIC else "rad"
@@ -119,22 +124,22 @@ class Team:
         return tuple(slice(end - size, end) for size, end in zip(sizes, ends, strict=True))
 
     def configuration_from_joints(self, positions: Array) -> Array:
-        """Configuration, shape (nq,), of one position per joint, shape (n,), any angle."""
+        """Return the configuration, shape (nq,), of joint positions, shape (n,)."""
         return self._coordinates.configuration(positions)
 
     def joints_from_configuration(self, q: Array) -> Array:
-        """One position per joint, shape (n,); of continuous joints within (-pi, pi]."""
+        """Return joint positions, shape (n,); those of continuous joints within (-pi, pi]."""
         return self._coordinates.positions(q)
 
     def difference(self, start: Array, end: Array) -> Array:
-        """Tangent vector from one configuration to another, shape (n,), the shortest way."""
+        """Return the shortest tangent vector from one configuration to another, shape (n,)."""
         return self._coordinates.difference(start, end)
 
     def state(self, q: Array, v: Array) -> TeamState:
-        """Dynamics and tool kinematics at (q, v); nobody may write into the arrays.
+        """Return dynamics and tool kinematics at (q, v); the arrays must not be modified.
 
-        On a team of prismatic joints all terms but the tool points are constant, and the same
-        arrays are handed out at every call.
+        For a team of prismatic joints all terms except the tool points are constant, and every
+        call returns the same arrays.
         """
         if not self.prismatic:
             return self._state(q, v)
@@ -143,15 +148,15 @@ class Team:
         known = self._constant
         positions = known.tool_positions + known.tool_jacobians[:, :3] @ q
         return TeamState(
-            q,
-            v,
-            known.M,
-            known.C,
-            known.g,
-            positions,
-            known.tool_jacobians,
-            known.tool_jacobian_rates,
-            known.tool_rotations,
+            q=q,
+            v=v,
+            M=known.M,
+            C=known.C,
+            g=known.g,
+            tool_positions=positions,
+            tool_jacobians=known.tool_jacobians,
+            tool_jacobian_rates=known.tool_jacobian_rates,
+            tool_rotations=known.tool_rotations,
         )
 
     def _state(self, q: Array, v: Array) -> TeamState:
@@ -171,44 +176,54 @@ class Team:
             positions[i], rotations[i] = placement.translation, placement.rotation
             jacobians[i] = pin.getFrameJacobian(model, data, tool, axes)
             rates[i] = pin.getFrameJacobianTimeVariation(model, data, tool, axes)
-        return TeamState(q, v, M, C, g, positions, jacobians, rates, rotations)
+        return TeamState(
+            q=q,
+            v=v,
+            M=M,
+            C=C,
+            g=g,
+            tool_positions=positions,
+            tool_jacobians=jacobians,
+            tool_jacobian_rates=rates,
+            tool_rotations=rotations,
+        )
 
     def inverse_dynamics(self, q: Array, v: Array, acceleration: Array) -> Array:
-        """Torque M a + C v + g for a joint acceleration, shape (n,) [N or N m]."""
+        """Return the torque M a + C v + g for a joint acceleration, shape (n,) [N or N m]."""
         return pin.rnea(self.model, self._data, q, v, acceleration).copy()
 
     def forward_dynamics(self, q: Array, v: Array, torque: Array) -> Array:
-        """Acceleration M^-1 (torque - C v - g), shape (n,): equation (3)."""
+        """Return the acceleration M^-1 (torque - C v - g), shape (n,): equation (3)."""
         return pin.aba(self.model, self._data, q, v, torque).copy()
 
     def gravity(self, q: Array) -> Array:
-        """Gravity torque g(q), shape (n,) [N or N m]."""
+        """Return the gravity torque g(q), shape (n,) [N or N m]."""
         return pin.computeGeneralizedGravity(self.model, self._data, q).copy()
 
     def mechanical_energy(self, q: Array, v: Array) -> float:
-        """Kinetic plus potential energy [J]."""
+        """Return the kinetic plus potential energy [J]."""
         return float(pin.computeMechanicalEnergy(self.model, self._data, q, v))
 
     def integrate(self, q: Array, step: Array) -> Array:
-        """Configuration reached from q along the tangent vector `step`, shape (n,)."""
+        """Return the configuration reached from q along the tangent vector `step`, shape (n,)."""
         return pin.integrate(self.model, q, step)
 
     def tool_rotations(self, q: Array) -> Array:
-        """Tool orientations in the world, shape (N, 3, 3)."""
+        """Return the tool orientations in the world, shape (N, 3, 3)."""
         pin.framesForwardKinematics(self.model, self._data, q)
         return np.array([self._data.oMf[tool].rotation for tool in self._tools])
 
     def external_torque(self, state: TeamState, wrenches: Array) -> Array:
-        """Joint torque of wrenches on the tools: sum of J_k' w_k, shape (n,).
+        """Return the joint torque of wrenches on the tools, sum of J_k' w_k, shape (n,).
 
         Args:
-            state: Where the team is.
+            state: State of the team.
             wrenches: Force and torque on each tool point, world axes, shape (N, 6) [N, N m].
         """
         return np.einsum("kin,ki->n", state.tool_jacobians, wrenches)
 
     def tool_wrenches(self, state: TeamState, torque: Array) -> Array:
-        """Smallest wrench on each tool that gives a joint torque, shape (N, 6) [N, N m]."""
+        """Return the smallest tool wrenches that cause a joint torque, shape (N, 6) [N, N m]."""
         return np.array(
             [
                 inverse @ torque[part]
@@ -219,23 +234,23 @@ class Team:
         )
 
     def _compute_tool_inverses(self, jacobians: Array) -> list[Array]:
-        """Pseudo-inverse of each robot's transposed tool Jacobian, shape (6, n_i) each."""
+        """Return the pseudo-inverse of each robot's transposed tool Jacobian, shape (6, n_i)."""
         parts = zip(jacobians, self.velocity_slices, strict=True)
         return [np.linalg.pinv(J[:, part].T) for J, part in parts]
 
     def index(self, name: str) -> int:
-        """Position of a robot in the team.
+        """Return the index of a robot in the team.
 
         Raises:
             TeamError: No robot has this name.
         """
         if name not in self.names:
-            raise TeamError(f"no robot is called {name!r}; the team has {list(self.names)}")
+            raise TeamError(f"no robot is named {name!r}; the team has {list(self.names)}")
         return self.names.index(name)
 
 
 def _join(robots: Sequence[Robot]) -> pin.Model:
-    """One model, each robot at its base; joints and frames are prefixed with its name."""
+    """Join robots into one model; the robot's name prefixes its joints and frames."""
     team = pin.Model()
     team.name = "team"
     for robot in robots:

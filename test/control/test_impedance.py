@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Potentials, their gradients, and gains spread over coordinates."""
+"""Potentials, their gradients, and gains per_coordinate over coordinates."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ import pytest
 from noninteract_ros.control.law.impedance import (
     Impedance,
     ImpedanceSettings,
-    spread,
+    per_coordinate,
     stack_impedance,
 )
 from noninteract_ros.errors import ScenarioError
@@ -62,17 +62,17 @@ def edges(count: int = 3) -> MixedPosition:
 
 def test_numbers_spread_over_coordinates():
     """One number serves all, one per axis repeats for every element, one each is taken as is."""
-    np.testing.assert_array_equal(spread(edges(), "damping", (4.0,)), [4.0] * 6)
-    np.testing.assert_array_equal(spread(edges(), "damping", (1.0, 2.0)), [1.0, 2.0] * 3)
+    np.testing.assert_array_equal(per_coordinate(edges(), "damping", (4.0,)), [4.0] * 6)
+    np.testing.assert_array_equal(per_coordinate(edges(), "damping", (1.0, 2.0)), [1.0, 2.0] * 3)
     each = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
-    np.testing.assert_array_equal(spread(edges(), "damping", each), each)
+    np.testing.assert_array_equal(per_coordinate(edges(), "damping", each), each)
 
 
 @pytest.mark.parametrize("count", [0, 3, 4, 5, 7])
 def test_other_counts_are_refused(count):
     """A list of another length is refused with the lengths that fit."""
     with pytest.raises(ScenarioError) as caught:
-        spread(edges(), "damping", (1.0,) * count)
+        per_coordinate(edges(), "damping", (1.0,) * count)
     assert str(caught.value) == (
         f"shape.damping: found {[1.0] * count}, allowed: 1 or 2 or 6 numbers"
     )

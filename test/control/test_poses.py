@@ -11,7 +11,7 @@ from noninteract_ros.control.law.decoupling import TaskError, commanded_accelera
 from noninteract_ros.control.law.impedance import (
     Impedance,
     ImpedanceSettings,
-    spread,
+    per_coordinate,
     stack_impedance,
 )
 from noninteract_ros.errors import ScenarioError
@@ -321,11 +321,11 @@ def test_gains_of_a_pose_are_one_per_axis_and_one_for_the_rotation():
     case = Case()
     task = case.stack.subtasks[0]
     np.testing.assert_array_equal(
-        spread(task, "damping", (1.0, 2.0, 3.0, 4.0)), [1, 2, 3, 4, 4, 4]
+        per_coordinate(task, "damping", (1.0, 2.0, 3.0, 4.0)), [1, 2, 3, 4, 4, 4]
     )
-    np.testing.assert_array_equal(spread(task, "damping", (5.0,)), [5.0] * 6)
+    np.testing.assert_array_equal(per_coordinate(task, "damping", (5.0,)), [5.0] * 6)
     with pytest.raises(ScenarioError) as caught:
-        spread(task, "stiffness", (1.0, 1.0, 1.0, 4.0, 4.0, 5.0))
+        per_coordinate(task, "stiffness", (1.0, 1.0, 1.0, 4.0, 4.0, 5.0))
     assert str(caught.value).endswith(
         "allowed: 1 or 4 numbers (x, y, z, rotation of each element)"
     )

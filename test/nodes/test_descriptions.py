@@ -78,7 +78,7 @@ def test_a_controller_waits_says_so_refuses_and_goes_on(ros: Ros, say: Any) -> N
     say("right", TEXTS["right"])
     until(ear.says("controller", "description of left on /left/robot_description"), "the left one")
     for text, expected in (
-        ("<robot", "text that is no XML"),
+        ("<robot", "text that is not XML"),
         ("<sdf/>", "XML with the root <sdf>"),
         (
             "<robot><link name='a'/><joint name='b' type='fixed'/></robot>",
@@ -148,7 +148,7 @@ def test_a_scenario_that_does_not_fit_ends_the_program(ros: Ros, say: Any) -> No
 
 def test_without_a_program_a_topic_is_no_description() -> None:
     """Who only reads the scenario is told what to do."""
-    with pytest.raises(ScenarioError, match=r"left.urdf: .* what `noninteract describe` makes"):
+    with pytest.raises(ScenarioError, match=r"left.urdf: .* a file by `noninteract describe`"):
         Scenario.from_dict(on_topics())
 
 

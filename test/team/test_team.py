@@ -207,7 +207,7 @@ def test_names_positions_and_brakes_come_from_the_robots():
 
 @pytest.mark.parametrize(
     ("names", "words"),
-    [(["solo"], ["at least 2", "found 1", "solo"]), (["a", "b", "a"], ["name of its own", "'a'"])],
+    [(["solo"], ["at least 2", "found 1", "solo"]), (["a", "b", "a"], ["unique name", "'a'"])],
 )
 def test_one_robot_or_a_name_twice_is_refused(names, words):
     """A team of one, or with two robots of one name, is refused with what was found."""

@@ -338,7 +338,7 @@ def refused(**keys) -> ScenarioError:
         ({"base_pose": [0.0] * 7}, "base_pose", "length 0", "length 1"),
         ({"urdf_text": ""}, "urdf", "neither", "one of them"),
         ({"urdf": "x", "urdf_text": "y"}, "urdf", "both", "one of them"),
-        ({"urdf_text": "hello"}, "urdf_text", "no XML", "a URDF"),
+        ({"urdf_text": "hello"}, "urdf_text", "not XML", "a URDF"),
         ({"urdf_text": "<model/>"}, "urdf_text", "<model>", "<robot>"),
         ({"urdf_text": "<robot name='x'/>"}, "urdf_text", "parser", "valid URDF"),
         (
@@ -364,7 +364,7 @@ def refused(**keys) -> ScenarioError:
             {"urdf_text": '<robot xmlns:xacro="http://ros.org/xacro"><xacro:a/></robot>'},
             "urdf_text",
             "xacro",
-            "program xacro",
+            "by xacro",
         ),
         (
             {"urdf_text": planar(kind="continuous"), "upper_limit": [1.0]},

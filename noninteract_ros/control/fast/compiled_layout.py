@@ -28,7 +28,7 @@ class CompiledLayout(Layout):
         from noninteract_ros.control.fast.kernels.motions import Numbers, deviation, difference
 
         begin = self.quaternions[:, 0].copy(), self.angular[:, 0].copy()
-        numbers = Numbers(self.values, self.rates, self._wound_rates, *begin)
+        numbers = Numbers(self.values, self.rates, self._angle_rates, *begin)
         return partial(difference, numbers), partial(deviation, numbers)
 
     def prepare(self) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.fast.kernels.array_parts import EDGES, JOINTS, MEAN, Places, Plan
+from noninteract_ros.control.fast.kernels.arrays import EDGES, JOINTS, MEAN, Indices, Plan
 from noninteract_ros.control.fast.robot_terms import RobotTerms
 from noninteract_ros.control.fast.robotwise_dynamics import Coordinates
 from noninteract_ros.subtasks.mixing import EdgeMixing, JointMixing, MeanMixing
@@ -37,24 +37,24 @@ class Roles:
     weights: Array
     rotation: TeamRotation | None
     offsets: Array | None
-    steps: Places
+    steps: Indices
     framed_points: bool
     framed_rotations: bool
     joints: tuple[JointMixing, ...]
 
     @property
     def rows(self) -> list[int]:
-        """Places of the axes among x, y, z."""
+        """Indices of the axes among x, y, z."""
         return [AXES.index(axis) for axis in self.axes]
 
     @property
     def in_q(self) -> list[int]:
-        """Places of the chosen joints in the configuration."""
+        """Indices of the chosen joints in the configuration."""
         return [place for item in self.joints for place in item.in_q]
 
     @property
     def in_v(self) -> list[int]:
-        """Places of the chosen joints in the velocity."""
+        """Indices of the chosen joints in the velocity."""
         return [place for item in self.joints for place in item.in_v]
 
     @classmethod
@@ -94,7 +94,7 @@ class Roles:
         )
 
 
-def _walk(edges: Sequence[EdgeMixing], count: int) -> Places | None:
+def _walk(edges: Sequence[EdgeMixing], count: int) -> Indices | None:
     """The walk of `Plan.steps`; None if the edges are no tree over all robots."""
     pairs = edges[0].pairs
     if len(pairs) != count - 1 or any(item.pairs != pairs for item in edges):
@@ -129,8 +129,8 @@ def _square(team: Team, h: int, joints: Sequence[JointMixing]) -> bool:
     return own == sizes and len(set(chosen)) == len(chosen)
 
 
-def value_places(stack: SubtaskStack) -> tuple[Places, Places]:
-    """Places of the values among all: those of mean and edges, sorted as `Plan` has it; joints."""
+def value_indices(stack: SubtaskStack) -> tuple[Indices, Indices]:
+    """Return the indices of values: of mean and edges, sorted as in `Plan`, and of joints."""
     mean, edges, joints = _by_role(stack, stack.value_slices)
     return np.concatenate([np.hstack(mean).ravel(), np.hstack(edges).ravel()]), joints
 
@@ -161,7 +161,7 @@ def coordinates(team: Team, stack: SubtaskStack, roles: Roles, robots: RobotTerm
     return Coordinates(h, plan, stack.slices, team.velocity_slices, chosen)
 
 
-def _parts(stack: SubtaskStack, a: int, h: int) -> Places:
+def _parts(stack: SubtaskStack, a: int, h: int) -> Indices:
     """What each subtask has of the sorted coordinates, see `Plan.parts`."""
     rows, joints = [], 0
     for task in stack.subtasks:
@@ -176,8 +176,8 @@ def _parts(stack: SubtaskStack, a: int, h: int) -> Places:
 
 def _by_role(
     stack: SubtaskStack, slices: Sequence[slice]
-) -> tuple[list[Places], list[Places], Places]:
-    """Places of mean and edges, each of positions and rotations by element, and of joints."""
+) -> tuple[list[Indices], list[Indices], Indices]:
+    """Indices of mean and edges, each of positions and rotations by element, and of joints."""
     count = max(len(task.elements) for task in stack.subtasks if _is(task, EdgeMixing))
     none = np.zeros((count, 0), dtype=np.intp)
     mean, edges, joints = [none[:1], none[:1]], [none, none], [none[0]]

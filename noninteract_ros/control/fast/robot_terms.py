@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.fast.kernels.array_parts import OWN_PARTS, Places
+from noninteract_ros.control.fast.kernels.arrays import ROBOT_ARRAYS, Indices
 from noninteract_ros.control.fast.kernels.robots import Poses, Tools, gather
 from noninteract_ros.team.joined_model import append_model
 from noninteract_ros.team.team import Team
@@ -31,7 +31,7 @@ class RobotTerms:
         sizes = [robot.model.nv for robot in team.robots]
         N, m = len(sizes), max(sizes)
         self.m = m
-        self.joints: Places = np.concatenate([k * m + np.arange(n) for k, n in enumerate(sizes)])
+        self.joints: Indices = np.concatenate([k * m + np.arange(n) for k, n in enumerate(sizes)])
         self.poses = Poses(
             np.zeros((N, 6, m)),
             np.zeros((N, 6, m)),
@@ -39,7 +39,7 @@ class RobotTerms:
             np.zeros((N, 3, 3)),
             np.zeros((N, 6)),
         )
-        self._start = np.zeros((OWN_PARTS, N, m, m))
+        self._start = np.zeros((ROBOT_ARRAYS, N, m, m))
         self._start[0] = np.eye(m)
         self._translations, self._rotations = np.zeros((N, 3)), np.zeros((N, 3, 3))
         self._moves = np.zeros((N, m))
@@ -53,7 +53,7 @@ class RobotTerms:
         self._gravity = [data.g for _, data, *_ in self._parts]
         self._constant: tuple[Array, Array, list[Array]] | None = None
         if team.prismatic:
-            terms, g = self._found(np.zeros_like(team.q0), np.zeros(team.n))
+            terms, g = self._evaluate(np.zeros_like(team.q0), np.zeros(team.n))
             self._constant = terms, g, [array.copy() for array in self.poses]
 
     def _add(self, k: int, model: pin.Model, tool: int, in_q: slice, in_v: slice) -> None:
@@ -73,22 +73,22 @@ class RobotTerms:
         views = *square, *wide, pose.translation, pose.rotation
         self._parts.append((model, data, in_q, in_v, views))
 
-    def tools(self, rows: Places, turning: bool, offsets: Array | None, chosen: Array) -> Tools:
+    def tools(self, rows: Indices, rotates: bool, offsets: Array | None, chosen: Array) -> Tools:
         """What the tools have at all states.
 
         Args:
             rows: Axes in use, out of 0, 1 and 2.
-            turning: Whether the tools' rotations count.
+            rotates: Whether the tools' rotations count.
             offsets: Constant rotations that they are taken with, shape (N, 3, 3), or None.
             chosen: T of the chosen joints and of the padding, shape (N, m, m).
         """
         turned = self._rotations if offsets is None else self._rotations @ offsets
-        return Tools(rows, turning, self._translations, turned, self._moves, chosen)
+        return Tools(rows, rotates, self._translations, turned, self._moves, chosen)
 
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return blocks of `array_parts.RobotArrays` with M and C, and gravity torque, (n,)."""
+        """Return blocks of `arrays.RobotArrays` with M and C, and gravity torque, (n,)."""
         if self._constant is None:
-            return self._found(q, v)
+            return self._evaluate(q, v)
         terms, g, poses = self._constant
         for array, constant in zip(self.poses, poses, strict=True):
             array[:] = constant
@@ -98,7 +98,7 @@ class RobotTerms:
         positions += (self.poses.jacobians[:, :3] @ way)[..., 0]
         return terms.copy(), g
 
-    def _found(self, q: Array, v: Array) -> tuple[Array, Array]:
+    def _evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
         blocks = self._start.copy()
         for k, (model, data, in_q, in_v, views) in enumerate(self._parts):
             q_k, v_k = q[in_q], v[in_v]

@@ -2,7 +2,7 @@
 """The law's terms robot by robot, at a cost linear in the number of robots.
 
 The stacked Jacobian is J = A T: T has one square block for each robot, to its tool's velocity and
-its chosen joints, and A mixes the tools as `kernels.array_parts.MixingArrays` has it and leaves
+its chosen joints, and A mixes the tools as `kernels.arrays.MixingArrays` has it and leaves
 the joints alone. Each robot k has h coordinates of its tool: the velocity of its tool point along
 the axes in use, and its angular velocity in axes of the tool. With them the rotation of a pair
 turns with R_a (omega_a - omega_b), a plain difference like that of the points. No matrix over the
@@ -23,7 +23,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.fast.kernels import task
-from noninteract_ros.control.fast.kernels.array_parts import Places, Plan
+from noninteract_ros.control.fast.kernels.arrays import Indices, Plan
 from noninteract_ros.control.fast.kernels.inertias import divide_by_inertias
 from noninteract_ros.control.law.decoupling import TaskDynamics, task_terms
 
@@ -37,23 +37,23 @@ class Coordinates:
         plan: The same for compiled functions.
         slices: Coordinates of each subtask.
         own: Coordinates of each robot in a vector over the joints.
-        chosen: Places of the chosen joints among N m own coordinates, in the subtasks' order.
+        chosen: Indices of the chosen joints among N m own coordinates, in the subtasks' order.
     """
 
     h: int
     plan: Plan
     slices: tuple[slice, ...]
     own: tuple[slice, ...]
-    chosen: Places
+    chosen: Indices
 
 
 class RobotwiseDynamics(TaskDynamics):
     """Task dynamics without matrices of the team; who asks for one gets it made.
 
     Args:
-        places: Coordinates of the subtasks.
-        blocks: Terms of the robots, see `kernels.array_parts.RobotArrays`.
-        mixers: The mixing A, see `kernels.array_parts.Mixing`.
+        coordinates: Coordinates of the subtasks.
+        blocks: Terms of the robots, see `kernels.arrays.RobotArrays`.
+        mixers: The mixing A, see `kernels.arrays.Mixing`.
         G_inverse: Inverse of the sum of all G_k, shape (1, h, h).
         g: Gravity torque, shape (n,).
         desired_inertias: For each subtask, shape (p_i,), or None for its own.
@@ -61,7 +61,7 @@ class RobotwiseDynamics(TaskDynamics):
 
     def __init__(
         self,
-        places: Coordinates,
+        coordinates: Coordinates,
         blocks: Array,
         mixers: Array,
         G_inverse: Array,
@@ -69,23 +69,23 @@ class RobotwiseDynamics(TaskDynamics):
         desired_inertias: tuple[Array | None, ...],
     ) -> None:
         values = {
-            "places": places,
+            "coordinates": coordinates,
             "blocks": blocks,
             "g": g,
-            "slices": places.slices,
+            "slices": coordinates.slices,
             "desired": desired_inertias,
             "_desired_parts": [
                 (part, desired)
-                for part, desired in zip(places.slices, desired_inertias, strict=True)
+                for part, desired in zip(coordinates.slices, desired_inertias, strict=True)
                 if desired is not None
             ],
-            "_shared": (places.plan, blocks, mixers),
-            "_inverse": (places.plan, blocks, mixers, G_inverse),
+            "_shared": (coordinates.plan, blocks, mixers),
+            "_inverse": (coordinates.plan, blocks, mixers, G_inverse),
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
 
-    places: Coordinates
+    coordinates: Coordinates
     blocks: Array
     desired: tuple[Array | None, ...]
     _desired_parts: list[tuple[slice, Array]]
@@ -108,7 +108,7 @@ class RobotwiseDynamics(TaskDynamics):
     def _joined(self, blocks: Array) -> Array:
         """Blocks of the robots on a diagonal, shape (n, n)."""
         result = np.zeros((len(self.g), len(self.g)))
-        for block, part in zip(blocks, self.places.own, strict=True):
+        for block, part in zip(blocks, self.coordinates.own, strict=True):
             size = part.stop - part.start
             result[part, part] = block[:size, :size]
         return result
@@ -151,7 +151,7 @@ class RobotwiseDynamics(TaskDynamics):
 
     def torque(self, v: Array, joint_acceleration: Array) -> Array:
         """M a + C v + g, shape (n,)."""
-        return task.torque(self.places.plan, self.blocks, self.g, v, joint_acceleration)
+        return task.torque(self.coordinates.plan, self.blocks, self.g, v, joint_acceleration)
 
     def coriolis_force(self, e_rate: Array) -> Array:
         """C~_i e_rate_i of every subtask, shape (n,)."""

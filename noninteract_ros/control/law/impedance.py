@@ -126,11 +126,14 @@ def stack_impedance(
     """
     pairs = list(zip(subtasks, settings, strict=True))
     return Impedance(
-        np.concatenate([spread(task, "stiffness", item.stiffness) for task, item in pairs]),
-        np.concatenate([spread(task, "damping", item.damping) for task, item in pairs]),
+        np.concatenate(
+            [per_coordinate(task, "stiffness", item.stiffness) for task, item in pairs]
+        ),
+        np.concatenate([per_coordinate(task, "damping", item.damping) for task, item in pairs]),
         np.concatenate([_max_force(task, item) for task, item in pairs]),
         tuple(
-            spread(task, "inertia", item.inertia) if item.inertia else None for task, item in pairs
+            per_coordinate(task, "inertia", item.inertia) if item.inertia else None
+            for task, item in pairs
         ),
         _rotations(subtasks),
         *(
@@ -141,7 +144,7 @@ def stack_impedance(
 
 
 def _or_zero(subtask: Subtask, name: str, values: Sequence[float]) -> Array:
-    return spread(subtask, name, values) if values else np.zeros(subtask.dim)
+    return per_coordinate(subtask, name, values) if values else np.zeros(subtask.dim)
 
 
 def _rotations(subtasks: Sequence[Subtask]) -> Array | None:
@@ -152,10 +155,10 @@ def _rotations(subtasks: Sequence[Subtask]) -> Array | None:
 def _max_force(subtask: Subtask, settings: ImpedanceSettings) -> Array:
     if settings.potential == "linear":
         return np.full(subtask.dim, np.inf)
-    return spread(subtask, "max_force", settings.max_force)
+    return per_coordinate(subtask, "max_force", settings.max_force)
 
 
-def spread(subtask: Subtask, name: str, values: Sequence[float]) -> Array:
+def per_coordinate(subtask: Subtask, name: str, values: Sequence[float]) -> Array:
     """Numbers for each coordinate of a subtask, shape (p,), from one or from some per element.
 
     Args:

@@ -117,7 +117,7 @@ class DesiredMotion:
     def __init__(self, limits: Array, direct: bool, layout: Layout | None = None) -> None:
         layout = layout or Layout.scalars(limits.shape[1])
         self._limits, self._direct, self._layout = limits, direct, layout
-        self._shaper, self._inheritance = MotionShaper(limits), AccelerationCarryOver(limits)
+        self._shaper, self._carry_over = MotionShaper(limits), AccelerationCarryOver(limits)
         self._zero = Target(np.zeros(layout.dim), np.zeros(layout.dim))
         self.hold_at(layout.identity)
 
@@ -146,7 +146,7 @@ class DesiredMotion:
             self._followed = motion
             return self._now
         if self._followed is not None:
-            self._now = self._inheritance.of(self._now)
+            self._now = self._carry_over.of(self._now)
         self._followed = self._gap = None
         if step > 0.0:
             self._now = self._shape(motion, step)
@@ -197,7 +197,7 @@ class DesiredMotion:
             return motion
         if self._jumps(motion, step):
             before = motion.extrapolate(-step, self._layout)
-            self._gap = self._inheritance.of(self._now, before).minus(before, self._layout)
+            self._gap = self._carry_over.of(self._now, before).minus(before, self._layout)
         if self._gap is not None and step > 0.0:
             self._gap, closed = self._shaper.towards(self._gap, self._zero, step)
             if closed:

@@ -8,7 +8,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.fast.compiled_layout import CompiledLayout
-from noninteract_ros.control.law.impedance import spread
+from noninteract_ros.control.law.impedance import per_coordinate
 from noninteract_ros.control.references.desired_motion import DesiredMotion
 from noninteract_ros.control.references.hand_over import HandOvers
 from noninteract_ros.control.references.inputs import SOURCES, MotionInput, Source
@@ -95,12 +95,14 @@ class SubtaskInput:
         self._hand_overs = HandOvers(*plan, subtask.name)
         self._timeout = settings.timeout
         names = ("max_velocity", "max_acceleration", "max_jerk")
-        limits = np.array([spread(subtask, name, getattr(settings, name)) for name in names])
+        limits = np.array(
+            [per_coordinate(subtask, name, getattr(settings, name)) for name in names]
+        )
         self.max_jerk: Array = limits[2]
         self._layout = CompiledLayout(subtask.layout)
         self._desired = DesiredMotion(limits, settings.takeover == "direct", self._layout)
-        self._max_force = spread(subtask, "max_wrench", settings.max_wrench)
-        self._max_force_rate = spread(subtask, "max_wrench_rate", settings.max_wrench_rate)
+        self._max_force = per_coordinate(subtask, "max_wrench", settings.max_wrench)
+        self._max_force_rate = per_coordinate(subtask, "max_wrench_rate", settings.max_wrench_rate)
         self._force: Array = np.zeros(subtask.dim)
 
     def hold_at(self, x: Array) -> None:

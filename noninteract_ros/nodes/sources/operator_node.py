@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseStamped, TwistStamped
 from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.law.impedance import spread
+from noninteract_ros.control.law.impedance import per_coordinate
 from noninteract_ros.errors import InputError, ScenarioError, one_of
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.nodes.messages.messages import (
@@ -54,7 +54,7 @@ class OperatorNode(ScenarioNode):
             raise ScenarioError("operator.subtask", repr(subtask), one_of(stack.names, subtask))
         task = stack.subtasks[stack.names.index(subtask)]
         settings = self.scenario.subtasks[subtask].input
-        limits = np.array([spread(task, name, getattr(settings, name)) for name in BOUNDS])
+        limits = np.array([per_coordinate(task, name, getattr(settings, name)) for name in BOUNDS])
         self.input = OperatorInput(self.settings, task, limits)
         self.dead_man = DeadManSwitch(self.settings.hold_timeout)
         self._codec = SubtaskCodec(subtask, task.elements, task.axes, task.rotates)

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kinds of subtask that a scenario can name."""
+"""Kinds of subtask that a scenario can name."""

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the team is and how it is turned: mean tool point and mean tool orientation."""
+"""Cooperative pose of the team: mean tool point and mean tool orientation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from noninteract_ros.schema import key
+from noninteract_ros.subtasks.components import MixedPoints
 from noninteract_ros.subtasks.kinds.composed_subtask import ComposedSubtask
 from noninteract_ros.subtasks.kinds.edges import NO_SUBTASKS
 from noninteract_ros.subtasks.kinds.mean_weights import ALIGNMENT_DOC, WEIGHTS_DOC, mean_weights
 from noninteract_ros.subtasks.kinds.mixed_position import chosen_axes
 from noninteract_ros.subtasks.mixing import MeanMixing
-from noninteract_ros.subtasks.parts import MixedPoints
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.subtasks.team_rotation import ALIGNMENTS, team_rotation
 from noninteract_ros.team.robot import AXES
@@ -23,16 +23,17 @@ class CooperativePose:
 
     kind: str = key("Kind of subtask", choices=("cooperative_pose",))
     axes: tuple[str, ...] = key(
-        "Axes of the world; by default those that all robots share", (), choices=AXES
+        "Axes of the world; by default the axes common to all robots", (), choices=AXES
     )
     weights: tuple[float, ...] = key(WEIGHTS_DOC, (), minimum=0.0)
     alignment: str = key(ALIGNMENT_DOC, "tools", choices=ALIGNMENTS)
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
-        """The subtask for a team.
+        """Return the subtask for a team.
 
         Raises:
-            ScenarioError: Weights or axes do not fit the team, or the tools point too far apart.
+            ScenarioError: Weights or axes do not fit the team, or the tool orientations are too
+                far apart.
         """
         weights = mean_weights(name, self.weights, team)
         rotation = team_rotation(name, team, weights, self.alignment)
@@ -51,10 +52,10 @@ class CooperativeOrientation:
     alignment: str = key(ALIGNMENT_DOC, "tools", choices=ALIGNMENTS)
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
-        """The subtask for a team.
+        """Return the subtask for a team.
 
         Raises:
-            ScenarioError: Weights do not fit the team, or the tools point too far apart.
+            ScenarioError: Weights do not fit the team, or tool orientations are too far apart.
         """
         weights = mean_weights(name, self.weights, team)
         rotation = team_rotation(name, team, weights, self.alignment)

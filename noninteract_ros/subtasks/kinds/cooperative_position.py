@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the team is: the weighted mean of the tool points, first row of (34)."""
+"""Cooperative position of the team: weighted mean of the tool points, first row of (34)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,15 +20,15 @@ class CooperativePosition:
 
     kind: str = key("Kind of subtask", choices=("cooperative_position",))
     axes: tuple[str, ...] = key(
-        "Axes of the world; by default those that all robots share", (), choices=AXES
+        "Axes of the world; by default the axes common to all robots", (), choices=AXES
     )
     weights: tuple[float, ...] = key(WEIGHTS_DOC, (), minimum=0.0)
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
-        """The subtask for a team.
+        """Return the subtask for a team.
 
         Raises:
-            ScenarioError: Weights do not fit the team, or the axes do not.
+            ScenarioError: Weights or axes do not fit the team.
         """
         weights = mean_weights(name, self.weights, team)
         axes = chosen_axes(name, self.axes, team)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the relative subtasks share: the pairs of robots, and the frame that they are seen from."""
+"""Pairs of robots and reference frame of the relative subtasks."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -9,7 +9,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError, one_of
-from noninteract_ros.subtasks.parts import Part
+from noninteract_ros.subtasks.components import Component
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.team import Team
 
@@ -17,16 +17,16 @@ WORLD = "world"
 NO_SUBTASKS: Mapping[str, Subtask] = MappingProxyType({})
 EDGES_DOC = "Pairs of robots in sequence, each with the value first - second; by default a chain"
 FRAME_DOC = (
-    "Frame that they are seen from: world, or a subtask with the team's orientation that is listed"
-    " before, as cooperative_pose has it"
+    "Reference frame: world, or the name of a subtask listed before that has an orientation of the"
+    " team, such as a cooperative_pose"
 )
 
 
 def edge_pairs(name: str, edges: Sequence[str], team: Team) -> list[tuple[str, str]]:
-    """Pairs of names from names in sequence; without any, a chain over the team.
+    """Return pairs of names from names in sequence; by default, a chain over the team.
 
     Raises:
-        ScenarioError: They do not name pairs of different robots of the team.
+        ScenarioError: The names are not pairs of different robots of the team.
     """
     if not edges:
         return list(pairwise(team.names))
@@ -39,33 +39,33 @@ def edge_pairs(name: str, edges: Sequence[str], team: Team) -> list[tuple[str, s
 
 
 def edge_names(pairs: Sequence[tuple[str, str]]) -> tuple[str, ...]:
-    """Names of the elements of a relative subtask."""
+    """Return the element names of a relative subtask."""
     return tuple(f"{first}-{second}" for first, second in pairs)
 
 
 def edge_indices(pairs: Sequence[tuple[str, str]], team: Team) -> list[tuple[int, int]]:
-    """Pairs of places in the team."""
+    """Return the pairs as robot indices."""
     return [(team.index(first), team.index(second)) for first, second in pairs]
 
 
 def edge_weights(pairs: Sequence[tuple[str, str]], team: Team) -> Array:
-    """+1 for the first and -1 for the second robot of each pair, shape (pairs, N)."""
+    """Return +1 for the first and -1 for the second robot of each pair, shape (pairs, N)."""
     weights = np.zeros((len(pairs), len(team.robots)))
     for row, (first, second) in zip(weights, edge_indices(pairs, team), strict=True):
         row[first], row[second] = 1.0, -1.0
     return weights
 
 
-def frame_named(name: str, frame: str, others: Mapping[str, Subtask]) -> Part | None:
-    """Rotation of the frame of a subtask; None for the world.
+def frame_named(name: str, frame: str, others: Mapping[str, Subtask]) -> Component | None:
+    """Return the rotation of a subtask's frame; None for the world.
 
     Args:
-        name: Subtask that asks, for error messages.
-        frame: `world` or another subtask's name.
-        others: Subtasks that there are already, by name.
+        name: Subtask that refers to the frame, for error messages.
+        frame: `world` or the name of another subtask.
+        others: Subtasks listed before, by name.
 
     Raises:
-        ScenarioError: There is no such subtask, or it has no orientation of the team.
+        ScenarioError: The subtask does not exist, or has no orientation of the team.
     """
     if frame == WORLD:
         return None

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far an arm's elbow is turned about the line from shoulder to wrist: its swivel angle.
+"""Elbow swivel angle: rotation of an arm's elbow about the line from shoulder to wrist.
 
 With d from shoulder to elbow, a from shoulder to wrist, u = a / |a| and a reference direction r,
 it is the angle about u from the half-plane of r to that of d:
@@ -9,8 +9,9 @@ it is the angle about u from the half-plane of r to that of d:
     dpsi/dt = g_d . dd/dt + g_a . da/dt,    g_d = (u x d) / |u x d|^2
     g_a = (-(u.d) g_d + (u.r) g_r) / |a|,   g_r = (u x r) / |u x r|^2
 
-g_d because the elbow goes round the line at the distance |u x d|; g_a because turning d, a and r
-together changes nothing. Two places have no such angle: a straight arm, and a line along r.
+g_d follows from the circular motion of the elbow about the line at the distance |u x d|, and g_a
+from the invariance under a common rotation of d, a and r. The angle is undefined for a straight
+arm and for a line along r.
 """
 
 from collections.abc import Mapping, Sequence
@@ -28,32 +29,33 @@ from noninteract_ros.subtasks.subtask import Subtask, SubtaskState
 from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.team import Team, TeamState
 
-TINY = 1e-12  # relative to lengths; keeps quotients finite where there is no angle
+TINY = 1e-12  # relative to lengths; keeps quotients finite where the angle is undefined
 
 
 @dataclass(frozen=True)
 class ElbowAngle:
     """Configuration block of the elbow angle subtask.
 
-    Its elements are the robots; messages carry an angle [rad] as the x of a translation. Angles
-    that are a whole turn apart are the same.
+    The elements are the robots; messages carry an angle [rad] as the x of a translation. Angles
+    that differ by full turns are equal.
     """
 
     kind: str = key("Kind of subtask", choices=("elbow_angle",))
     shoulder: tuple[str, ...] = key("Frame at the shoulder: one for all robots or one per robot")
-    elbow: tuple[str, ...] = key("Frame at the elbow, likewise")
-    wrist: tuple[str, ...] = key("Frame at the wrist, likewise")
-    robots: tuple[str, ...] = key("Robots whose elbows count; by default all", ())
+    elbow: tuple[str, ...] = key("Frame at the elbow: one for all robots or one per robot")
+    wrist: tuple[str, ...] = key("Frame at the wrist: one for all robots or one per robot")
+    robots: tuple[str, ...] = key("Robots with a controlled elbow; by default all", ())
     reference: tuple[float, ...] = key(
-        "Direction in the world at which the angle is zero; never along shoulder to wrist",
+        "Direction in the world at which the angle is zero; must not become parallel to the line"
+        " from shoulder to wrist",
         (0.0, 0.0, 1.0),
     )
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
-        """The subtask for a team.
+        """Return the subtask for a team.
 
         Raises:
-            ScenarioError: A robot or a frame is not there, or the reference is no direction.
+            ScenarioError: A robot or a frame does not exist, or the reference is zero.
         """
         names = self.robots or team.names
         for robot in names:
@@ -88,7 +90,13 @@ def _frame_numbers(path: str, given: tuple[str, ...], robots: Sequence[Robot]) -
 
 
 class Normal(NamedTuple):
-    """What of a vector goes round a moving axis: n / |n|^2 with n = u x vector."""
+    """Normal n = u x vector of a moving axis u, divided by |n|^2, with its rate.
+
+    Attributes:
+        value: n / |n|^2, shape (3,).
+        rate: Time derivative of the value, shape (3,).
+        distance: |n|.
+    """
 
     value: Array
     rate: Array
@@ -104,12 +112,12 @@ def _normal(u: Array, u_rate: Array, vector: Array, vector_rate: Array) -> Norma
 
 
 class _Arm:
-    """One robot's angle, in axes of its base.
+    """Elbow angle of one robot, in axes of its base.
 
     Args:
-        team: The robots.
-        robot: The one.
-        frames: Numbers of the frames at shoulder, elbow and wrist.
+        team: Team of the robot.
+        robot: Robot of the arm.
+        frames: Indices of the frames at shoulder, elbow and wrist.
         reference: Unit vector in the world, shape (3,).
     """
 
@@ -125,7 +133,7 @@ class _Arm:
         self._reference = robot.base_pose.rotation.T @ reference
 
     def lines(self, q: Array) -> tuple[Array, Array]:
-        """Shoulder to elbow and shoulder to wrist, shape (3,) each [m]."""
+        """Return the vectors shoulder to elbow and shoulder to wrist, shape (3,) each [m]."""
         pin.forwardKinematics(self._model, self._data, q[self._in_q])
         shoulder, elbow, wrist = (
             pin.updateFramePlacement(self._model, self._data, frame).translation
@@ -134,7 +142,7 @@ class _Arm:
         return elbow - shoulder, wrist - shoulder
 
     def singularity_distance(self, q: Array) -> float:
-        """Smaller sine of the line's angles to the upper arm and to the reference."""
+        """Return the smaller sine of the line's angles to the upper arm and to the reference."""
         d, a = self.lines(q)
         length = float(np.linalg.norm(a))
         if length <= TINY * float(np.linalg.norm(d)):
@@ -143,7 +151,7 @@ class _Arm:
         return float(min(bent, np.linalg.norm(np.cross(a, self._reference))) / length)
 
     def evaluate(self, q: Array, v: Array) -> tuple[float, Array, Array]:
-        """Angle, its Jacobian and that one's rate, over the robot's own joints."""
+        """Return angle, Jacobian and Jacobian rate, with respect to the robot's own joints."""
         v = v[self.in_v]
         pin.computeJointJacobiansTimeVariation(self._model, self._data, q[self._in_q], v)
         d, a = self.lines(q)
@@ -152,23 +160,23 @@ class _Arm:
         u, d_rate, a_rate = a / length, D @ v, A @ v
         stretch = u @ a_rate
         u_rate = (a_rate - stretch * u) / length
-        around, apart = _normal(u, u_rate, d, d_rate), _normal(u, u_rate, r, np.zeros(3))
+        swivel, offset = _normal(u, u_rate, d, d_rate), _normal(u, u_rate, r, np.zeros(3))
         along_d, along_r = u @ d, u @ r
-        g_d = around.value
-        g_a = (along_r * apart.value - along_d * g_d) / length
+        g_d = swivel.value
+        g_a = (along_r * offset.value - along_d * g_d) / length
         g_a_rate = (
-            (u_rate @ r) * apart.value
-            + along_r * apart.rate
+            (u_rate @ r) * offset.value
+            + along_r * offset.rate
             - (u_rate @ d + u @ d_rate) * g_d
-            - along_d * around.rate
+            - along_d * swivel.rate
             - stretch * g_a
         ) / length
         angle = np.arctan2(length * (d @ np.cross(a, r)), np.cross(a, d) @ np.cross(a, r))
-        J_rate = around.rate @ D + g_d @ D_rate + g_a_rate @ A + g_a @ A_rate
+        J_rate = swivel.rate @ D + g_d @ D_rate + g_a_rate @ A + g_a @ A_rate
         return float(angle), g_d @ D + g_a @ A, J_rate
 
     def _jacobians(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
-        """Jacobians of both lines, and their rates, shape (3, nv) each."""
+        """Return the Jacobians of both lines, and their rates, shape (3, nv) each."""
         axes = pin.LOCAL_WORLD_ALIGNED
         found = []
         for of in (pin.getFrameJacobian, pin.getFrameJacobianTimeVariation):
@@ -184,8 +192,8 @@ class ElbowAngles(Subtask):
 
     Args:
         name: Name of the subtask.
-        robots: Names of the robots, its elements.
-        arms: Their angles.
+        robots: Names of the robots, which are the elements.
+        arms: Elbow angle of each robot.
     """
 
     axes = ("x",)
@@ -195,12 +203,12 @@ class ElbowAngles(Subtask):
         self.name, self.elements, self._arms = name, robots, tuple(arms)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
-        """Values and differentials; bounded, but without meaning, where there is no angle."""
+        """Return value and differentials; bounded, but meaningless, at an undefined angle."""
         x, (J, J_rate) = np.empty(self.dim), np.zeros((2, self.dim, len(state.v)))
         for i, arm in enumerate(self._arms):
             x[i], J[i, arm.in_v], J_rate[i, arm.in_v] = arm.evaluate(state.q, state.v)
         return SubtaskState(x, J, J_rate)
 
     def singularity_distance(self, state: TeamState) -> float:
-        """How far the arms are from being straight and from pointing along the reference."""
+        """Return the least distance of the arms from an undefined angle."""
         return min(arm.singularity_distance(state.q) for arm in self._arms)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the cooperative subtasks share: the weights of the robots."""
+"""Robot weights and alignment of the cooperative subtasks."""
 
 from collections.abc import Sequence
 
@@ -9,18 +9,18 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.team.team import Team
 
-WEIGHTS_DOC = "Weight of each robot, normalised to sum 1; by default equal"
+WEIGHTS_DOC = "Weight of each robot, normalised to a sum of 1; by default equal"
 ALIGNMENT_DOC = (
-    "tools: orientations of the tool frames as they are; start: counted from where they are at"
-    " the start, for tools that face each other"
+    "Reference of the tool orientations: tools, the tool frames themselves, or start, the initial"
+    " orientations of the tools, for tools that face each other"
 )
 
 
 def mean_weights(name: str, weights: Sequence[float], team: Team) -> Array:
-    """Weights of the robots with sum 1, shape (N,); without any, equal ones.
+    """Return the weights of the robots with sum 1, shape (N,); by default, equal weights.
 
     Raises:
-        ScenarioError: They do not fit the team, or there is no positive one.
+        ScenarioError: The count does not fit the team, or no weight is positive.
     """
     count = len(team.robots)
     found = np.array(weights or (1.0,) * count)

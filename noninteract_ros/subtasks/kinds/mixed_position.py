@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Subtasks that mix the robots' tool points with constant weights."""
+"""Subtasks that combine the tool points with constant weights."""
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
@@ -14,7 +14,7 @@ class MixedPosition(Subtask):
 
     Args:
         name: Name of the subtask.
-        elements: One name per row of `weights`.
+        elements: Element names, one per row of `weights`.
         axes: Axes of the world, in any order.
         weights: W, shape (elements, N).
     """
@@ -28,7 +28,7 @@ class MixedPosition(Subtask):
         self._mixed, self._mixed_rate = Memo(self._mix), Memo(self._mix)
 
     def evaluate(self, state: TeamState) -> SubtaskState:
-        """Value, Jacobian and Jacobian rate; the mixing is constant, so are its derivatives."""
+        """Return value, Jacobian and Jacobian rate, each combined with the constant weights."""
         x = self._weights @ state.tool_positions[:, self._rows]
         J = self._mixed(state.tool_jacobians)
         return SubtaskState(x.ravel(), J, self._mixed_rate(state.tool_jacobian_rates))
@@ -40,17 +40,17 @@ class MixedPosition(Subtask):
 
 
 def axis_rows(axes: tuple[str, ...]) -> slice | list[int]:
-    """Places of axes among x, y, z: a slice, which is a view, or indices in another order."""
+    """Return the indices of axes among x, y, z: a slice, which gives views, or a list."""
     rows = [AXES.index(axis) for axis in axes]
     ordered = rows == list(range(rows[0], rows[0] + len(rows))) if rows else False
     return slice(rows[0], rows[-1] + 1) if ordered else rows
 
 
 def chosen_axes(name: str, axes: tuple[str, ...], team: Team) -> tuple[str, ...]:
-    """The axes asked for, or by default those along which every robot can move.
+    """Return the given axes, or by default the axes along which every robot can move.
 
     Raises:
-        ScenarioError: An axis twice, or no axis is common to all robots.
+        ScenarioError: An axis is repeated, or no axis is common to all robots.
     """
     common = tuple(axis for axis in AXES if all(axis in robot.axes for robot in team.robots))
     chosen = axes or common

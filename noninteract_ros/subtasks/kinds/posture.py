@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Chosen joints, so that redundant arms have no internal motion left: assumption 2."""
+"""Posture of chosen joints, which leaves redundant arms no internal motion: assumption 2."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,19 +19,19 @@ from noninteract_ros.team.team import Team, TeamState
 class Posture:
     """Configuration block of the posture subtask.
 
-    Its elements are the joints; messages carry a joint's coordinate [m or rad] as the x of its
+    The elements are the joints; messages carry a joint's coordinate [m or rad] as the x of a
     translation.
     """
 
     kind: str = key("Kind of subtask", choices=("posture",))
-    joints: tuple[str, ...] = key("Joints, as <robot>/<joint>")
+    joints: tuple[str, ...] = key("Joints of the posture, as <robot>/<joint>")
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
-        """The subtask for a team.
+        """Return the subtask for a team.
 
         Raises:
-            ScenarioError: No joint, one twice, or one that the team does not have or that has no
-                single coordinate (a continuous joint has a sine and a cosine).
+            ScenarioError: No joint is given, a joint is repeated, does not exist, or is
+                continuous: the configuration of a continuous joint is a sine and a cosine.
         """
         able = {
             joint_name: (joint.idx_q, joint.idx_v)
@@ -44,42 +44,42 @@ class Posture:
         for joint in self.joints:
             if joint not in able:
                 raise ScenarioError(path, repr(joint), one_of(able, joint))
-        places = [able[joint] for joint in self.joints]
-        units = tuple(team.units[in_v] for _, in_v in places)
-        return JointSelection(name, self.joints, places, units, team.n)
+        indices = [able[joint] for joint in self.joints]
+        units = tuple(team.units[in_v] for _, in_v in indices)
+        return JointSelection(name, self.joints, indices, units, team.n)
 
 
 class JointSelection(Subtask):
-    """Coordinates of some joints.
+    """Coordinates of chosen joints.
 
     Args:
         name: Name of the subtask.
-        joints: Names of the joints, its elements.
-        places: Place of each in the configuration and in the velocity.
-        units: Unit of each.
-        n: Number of velocities of the team.
+        joints: Names of the joints, which are the elements.
+        indices: Index of each joint in the configuration and in the velocity.
+        units: Unit of each joint.
+        n: Dimension of the team's velocity.
     """
 
     def __init__(
         self,
         name: str,
         joints: tuple[str, ...],
-        places: Sequence[tuple[int, int]],
+        indices: Sequence[tuple[int, int]],
         units: tuple[str, ...],
         n: int,
     ) -> None:
         self.name, self.elements, self.axes = name, joints, ("x",)
-        self._in_q: Array = np.array([in_q for in_q, _ in places])
-        self._J = np.eye(n)[[in_v for _, in_v in places]]
+        self._in_q: Array = np.array([in_q for in_q, _ in indices])
+        self._J = np.eye(n)[[in_v for _, in_v in indices]]
         self._J_rate = np.zeros_like(self._J)
-        self.mixing = JointMixing(*zip(*places, strict=True))
+        self.mixing = JointMixing(*zip(*indices, strict=True))
         self._units = units
 
     @property
     def element_units(self) -> tuple[str, ...]:
-        """Metres where a joint slides."""
+        """Unit of each joint: m if prismatic, rad if revolute."""
         return self._units
 
     def evaluate(self, state: TeamState) -> SubtaskState:
-        """Value and its constant Jacobian."""
+        """Return value and constant Jacobian."""
         return SubtaskState(state.q[self._in_q], self._J, self._J_rate)

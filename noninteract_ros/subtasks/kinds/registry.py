@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The kinds of subtask that a scenario can name, and how to add one.
+"""Registry of the kinds of subtask that a scenario can name.
 
 A kind is a frozen dataclass of `schema.key` fields, one of them `kind: str`, with a method
 `build(name, team, others)` that returns a `Subtask`; `others` are the subtasks listed before it,
-by name. A scenario names it by its import path, `kind: my_package.my_module:MyKind`, or by the
-name that `register_kind` has given it.
+by name. A scenario names a kind by its import path, `kind: my_package.my_module:MyKind`, or by
+the name registered with `register_kind`.
 """
 
 from collections.abc import Mapping
@@ -25,10 +25,10 @@ from noninteract_ros.team.team import Team
 
 
 class SubtaskBlock(Protocol):
-    """Configuration of one subtask: a dataclass of `schema.key` fields that builds it."""
+    """Configuration block of one subtask: a dataclass of `schema.key` fields that builds it."""
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask]) -> Subtask:
-        """The subtask for a team, with the subtasks that are listed before it, by name."""
+        """Return the subtask for a team, given the subtasks that are listed before it, by name."""
 
 
 SUBTASK_KINDS: dict[str, type[SubtaskBlock]] = {
@@ -44,10 +44,10 @@ SUBTASK_KINDS: dict[str, type[SubtaskBlock]] = {
 
 
 def register_kind(name: str, block: type[SubtaskBlock]) -> None:
-    """Lets scenarios name a kind of subtask.
+    """Register a kind of subtask under a name that scenarios can use.
 
     Raises:
-        ScenarioError: The name is taken by another class, or the class is no block.
+        ScenarioError: The name is used by another class, or the class is no block.
     """
     if SUBTASK_KINDS.get(name, block) is not block:
         raise ScenarioError("kind", repr(name), f"none of {one_of(SUBTASK_KINDS)}")
@@ -55,14 +55,15 @@ def register_kind(name: str, block: type[SubtaskBlock]) -> None:
 
 
 def kind_named(path: str, kind: object) -> type[SubtaskBlock]:
-    """The block of a kind, by its registered name or its import path `module:Class`.
+    """Return the block of a kind, by its registered name or its import path `module:Class`.
 
     Args:
-        path: Dotted key that names it, for error messages.
-        kind: What was found there.
+        path: Dotted key that names the kind, for error messages.
+        kind: Value of that key.
 
     Raises:
-        ScenarioError: There is no such kind, its module cannot be imported, or it is no block.
+        ScenarioError: The kind does not exist, its module cannot be imported, or the class is no
+            block.
     """
     if isinstance(kind, str) and kind in SUBTASK_KINDS:
         return SUBTASK_KINDS[kind]

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the robots stand and point to each other: the grasp, or the formation."""
+"""Relative poses of pairs of robots: the grasp, or the formation."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from noninteract_ros.schema import key
+from noninteract_ros.subtasks.components import Component, MixedPoints
 from noninteract_ros.subtasks.kinds.composed_subtask import ComposedSubtask
 from noninteract_ros.subtasks.kinds.edges import (
     EDGES_DOC,
@@ -19,9 +20,8 @@ from noninteract_ros.subtasks.kinds.edges import (
 )
 from noninteract_ros.subtasks.kinds.mean_weights import ALIGNMENT_DOC
 from noninteract_ros.subtasks.kinds.mixed_position import chosen_axes
-from noninteract_ros.subtasks.kinds.relative_parts import RelativePoints, RelativeRotations
+from noninteract_ros.subtasks.kinds.relative_components import RelativePoints, RelativeRotations
 from noninteract_ros.subtasks.mixing import EdgeMixing
-from noninteract_ros.subtasks.parts import MixedPoints, Part
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.subtasks.team_rotation import ALIGNMENTS, tool_offsets
 from noninteract_ros.team.robot import AXES
@@ -36,27 +36,29 @@ class RelativePose:
     edges: tuple[str, ...] = key(EDGES_DOC, ())
     frame: str = key(FRAME_DOC, WORLD)
     axes: tuple[str, ...] = key(
-        "Axes of the frame; by default those that all robots share", (), choices=AXES
+        "Axes of the frame; by default the axes common to all robots", (), choices=AXES
     )
     alignment: str = key(ALIGNMENT_DOC, "tools", choices=ALIGNMENTS)
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
-        """The subtask for a team, with the subtasks that are listed before it.
+        """Return the subtask for a team, given the subtasks that are listed before it.
 
         Raises:
-            ScenarioError: The edges do not name pairs of different robots of the team, or the
-                frame is no subtask with an orientation.
+            ScenarioError: The edges are not pairs of different robots of the team, or the frame is
+                no subtask with an orientation.
         """
         pairs = edge_pairs(name, self.edges, team)
-        places = edge_indices(pairs, team)
+        indices = edge_indices(pairs, team)
         frame = frame_named(name, self.frame, others)
         weights = edge_weights(pairs, team)
-        points: Part = MixedPoints(weights) if frame is None else RelativePoints(weights, frame)
+        points: Component = (
+            MixedPoints(weights) if frame is None else RelativePoints(weights, frame)
+        )
         offsets = tool_offsets(team, self.alignment)
-        rotations = RelativeRotations(places, offsets, frame)
+        rotations = RelativeRotations(indices, offsets, frame)
         axes = chosen_axes(name, self.axes, team)
         subtask = ComposedSubtask(name, edge_names(pairs), axes, points, rotations)
-        subtask.mixing = EdgeMixing(axes, tuple(places), True, offsets, frame)
+        subtask.mixing = EdgeMixing(axes, tuple(indices), True, offsets, frame)
         return subtask
 
 
@@ -70,12 +72,12 @@ class RelativeOrientation:
     alignment: str = key(ALIGNMENT_DOC, "tools", choices=ALIGNMENTS)
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
-        """The subtask for a team; raises as `RelativePose.build`."""
+        """Return the subtask for a team; see `RelativePose.build` for errors."""
         pairs = edge_pairs(name, self.edges, team)
         frame = frame_named(name, self.frame, others)
         offsets = tool_offsets(team, self.alignment)
-        places = edge_indices(pairs, team)
-        rotations = RelativeRotations(places, offsets, frame)
+        indices = edge_indices(pairs, team)
+        rotations = RelativeRotations(indices, offsets, frame)
         subtask = ComposedSubtask(name, edge_names(pairs), (), None, rotations)
-        subtask.mixing = EdgeMixing((), tuple(places), True, offsets, frame)
+        subtask.mixing = EdgeMixing((), tuple(indices), True, offsets, frame)
         return subtask

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How the robots stand to each other: differences of tool points, second row of (34)."""
+"""Relative positions of pairs of robots: differences of tool points, second row of (34)."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from noninteract_ros.subtasks.kinds.edges import (
     frame_named,
 )
 from noninteract_ros.subtasks.kinds.mixed_position import MixedPosition, chosen_axes
-from noninteract_ros.subtasks.kinds.relative_parts import RelativePoints
+from noninteract_ros.subtasks.kinds.relative_components import RelativePoints
 from noninteract_ros.subtasks.mixing import EdgeMixing
 from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.robot import AXES
@@ -33,15 +33,15 @@ class RelativePosition:
     edges: tuple[str, ...] = key(EDGES_DOC, ())
     frame: str = key(FRAME_DOC, WORLD)
     axes: tuple[str, ...] = key(
-        "Axes of the frame; by default those that all robots share", (), choices=AXES
+        "Axes of the frame; by default the axes common to all robots", (), choices=AXES
     )
 
     def build(self, name: str, team: Team, others: Mapping[str, Subtask] = NO_SUBTASKS) -> Subtask:
-        """The subtask for a team, with the subtasks that are listed before it.
+        """Return the subtask for a team, given the subtasks that are listed before it.
 
         Raises:
-            ScenarioError: The edges do not name pairs of different robots of the team, or the
-                frame is no subtask with an orientation.
+            ScenarioError: The edges are not pairs of different robots of the team, or the frame is
+                no subtask with an orientation.
         """
         pairs = edge_pairs(name, self.edges, team)
         elements, weights = edge_names(pairs), edge_weights(pairs, team)

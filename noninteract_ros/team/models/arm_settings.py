@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What every arm has in a scenario: a place, a posture to start from, brakes."""
+"""Settings common to all arms: base pose, initial position, brake damping."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +9,6 @@ import pinocchio as pin
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import join, key
-from noninteract_ros.team.base_pose import base_pose
 from noninteract_ros.team.joint_settings import (
     JointSettings,
     configuration_within,
@@ -17,60 +17,89 @@ from noninteract_ros.team.joint_settings import (
 )
 from noninteract_ros.team.robot import AXES, Robot, position_limits
 
+UNIT_TOLERANCE = 1e-3  # of a quaternion's length, for quaternions rounded by hand
 _TRIALS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArmSettings(JointSettings):
-    """Keys that arms of every kind have."""
+    """Keys common to arms of every kind."""
 
     base_pose: tuple[float, ...] = key(
         "Pose of the base in the world: x y z [m], quaternion qx qy qz qw",
         (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
     )
     initial_position: tuple[float, ...] = key(
-        "Initial position of each joint that moves [m or rad]; by default zeros", ()
+        "Initial position of each movable joint [m or rad]; by default zeros", ()
     )
     brake_damping: tuple[float, ...] = key(
-        "Joint damping of its own brake without commands, for all joints or one per joint"
-        " [N s/m or N m s/rad]",
+        "Joint damping of the robot's brake, which acts while no commands arrive; one number for"
+        " all joints or one per joint [N s/m or N m s/rad]",
         (5.0,),
         minimum=0.0,
     )
 
-    def arm(self, name: str, model: pin.Model, tool_frame: str) -> Robot:
-        """The robot of a model, which is equipped with the joint settings here.
+    def robot(self, name: str, model: pin.Model, tool_frame: str) -> Robot:
+        """Return the robot of a model, after writing the joint settings into the model.
 
         Raises:
             ScenarioError: A key does not fit the model.
         """
         self.apply_to(name, model)
-        base = base_pose(join(name, "base_pose"), self.base_pose)
+        base = _pose(join(name, "base_pose"), self.base_pose)
         brakes = per_joint(join(name, "brake_damping"), self.brake_damping, joint_names(model))
         axes = tool_axes(model, tool_frame, base)
         start = configuration_within(
             join(name, "initial_position"), self.initial_position, model, position_limits(model)
         )
         _check_inertia(name, model, start)
-        return Robot(name, model, tool_frame, start, axes, brakes, base)
+        return Robot(
+            name=name,
+            model=model,
+            tool_frame=tool_frame,
+            initial_position=start,
+            axes=axes,
+            brake_damping=brakes,
+            base_pose=base,
+        )
+
+
+def _pose(key: str, numbers: Sequence[float]) -> pin.SE3:
+    """Return the pose of position [m] and quaternion: x, y, z, qx, qy, qz, qw.
+
+    Raises:
+        ScenarioError: The count is not seven, or the quaternion is not of unit length.
+    """
+    if len(numbers) != 7:
+        raise ScenarioError(key, list(numbers), "7 numbers: x y z qx qy qz qw")
+    rotation = np.array(numbers[3:])
+    length = np.linalg.norm(rotation)
+    if abs(length - 1.0) > UNIT_TOLERANCE:
+        found = f"{list(numbers)} with a quaternion of length {length:.4g}"
+        raise ScenarioError(key, found, "x y z qx qy qz qw with a quaternion of length 1")
+    return pin.XYZQUATToSE3(np.array([*numbers[:3], *(rotation / length)]))
 
 
 def tool_axes(model: pin.Model, tool_frame: str, base: pin.SE3) -> tuple[str, ...]:
-    """Axes of the world along which the tool moves, at some configurations at least."""
+    """Return the world axes along which the tool can translate, from random configurations."""
     data, tool = model.createData(), model.getFrameId(tool_frame)
     rng = np.random.default_rng(0)
     reach = np.zeros(3)
     for _ in range(_TRIALS):
         q = pin.integrate(model, pin.neutral(model), rng.uniform(-1.0, 1.0, model.nv))
         J = pin.computeFrameJacobian(model, data, q, tool, pin.LOCAL_WORLD_ALIGNED)
-        linear = J.reshape(6, model.nv)[:3]  # Of a single joint it is a vector.
+        linear = J.reshape(6, model.nv)[:3]  # A vector for a single joint.
         reach = np.maximum(reach, np.abs(base.rotation @ linear).max(axis=1))
     moves = reach > 1e-9 * max(1.0, float(reach.max()))
     return tuple(axis for axis, it_moves in zip(AXES, moves, strict=True) if it_moves)
 
 
 def _check_inertia(name: str, model: pin.Model, q: np.ndarray) -> None:
-    """Refuses joints that accelerate without any torque."""
+    """Check that the inertia matrix is positive-definite.
+
+    Raises:
+        ScenarioError: A joint moves no mass.
+    """
     M = pin.crba(model, model.createData(), q).reshape(model.nv, model.nv)
     inertias = np.linalg.eigvalsh(M, UPLO="U")
     if inertias.min() <= 1e-12 * max(1.0, inertias.max()):

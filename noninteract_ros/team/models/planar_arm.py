@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A serial arm whose joints all turn in one plane, made from lengths and masses."""
+"""Planar serial arm, built from link lengths and masses."""
 
 from dataclasses import dataclass
 
@@ -19,29 +19,29 @@ TOOL = "tool"
 class PlanarArm(ArmSettings):
     """Configuration block of a planar arm.
 
-    At position zero all links lie along the first axis of the plane; joints turn towards the
-    second one. The joints are called joint_1, joint_2, ...; the tool is the end of the last link.
+    At position zero all links lie along the first axis of the plane; joints rotate towards the
+    second one. The joints are named joint_1, joint_2, ...; the tool is the end of the last link.
     """
 
     link_lengths: tuple[float, ...] = key("Length of each link [m]", positive=True)
     link_masses: tuple[float, ...] = key("Mass of each link [kg]", positive=True)
-    model: str = key("Kind of robot", "planar_arm", choices=("planar_arm",))
+    model: str = key("Robot model", "planar_arm", choices=("planar_arm",))
     mass_location: str = key(
-        "Where a link's mass is: along it, as in a thin uniform rod, or all at its tip",
+        "Mass distribution of a link: rod, a thin uniform rod, or tip, a point mass at its end",
         "rod",
         choices=("rod", "tip"),
     )
     plane: str = key(
-        "Plane of the motion in axes of the base; with gravity along -z only xy is free of it",
+        "Plane of the motion in axes of the base; horizontal is xy, if gravity acts along -z",
         "xy",
         choices=("xy", "xz", "yz"),
     )
 
     def build(self, name: str) -> Robot:
-        """The robot as a Pinocchio model.
+        """Return the robot as a Pinocchio model.
 
         Raises:
-            ScenarioError: The lists do not fit each other.
+            ScenarioError: The lists differ in length, or a key does not fit the model.
         """
         count = len(self.link_lengths)
         if not count:
@@ -55,18 +55,18 @@ class PlanarArm(ArmSettings):
         links = zip(self.link_lengths, self.link_masses, strict=True)
         for number, (length, mass) in enumerate(links, start=1):
             parent = model.addJoint(parent, pin.JointModelRZ(), place, f"joint_{number}")
-            model.addJointFrame(parent)  # So that people can push the elbow.
+            model.addJointFrame(parent)  # Point of application of pushes.
             model.appendBodyToJoint(parent, self._body(length, mass), pin.SE3.Identity())
             place = pin.SE3(np.eye(3), np.array([length, 0.0, 0.0]))
         model.addFrame(pin.Frame(TOOL, parent, place, pin.FrameType.OP_FRAME))
-        return self.arm(name, model, TOOL)
+        return self.robot(name, model, TOOL)
 
     def description(self, name: str) -> str:
-        """Its URDF, in the frame of its base."""
+        """Return the URDF in the frame of the base."""
         return urdf_text(self.build(name))
 
     def _body(self, length: float, mass: float) -> pin.Inertia:
-        """Inertia of a link along x from its joint."""
+        """Return the inertia of a link along x from its joint."""
         if self.mass_location == "tip":
             return pin.Inertia(mass, np.array([length, 0.0, 0.0]), np.zeros((3, 3)))
         across = mass * length**2 / 12.0
@@ -76,6 +76,6 @@ class PlanarArm(ArmSettings):
 
 
 def _plane_rotation(plane: str) -> np.ndarray:
-    """Rotation that takes x and y to the axes of a plane."""
+    """Return the rotation that maps x and y to the axes of a plane."""
     first, second = (np.eye(3)[AXES.index(axis)] for axis in plane)
     return np.column_stack([first, second, np.cross(first, second)])

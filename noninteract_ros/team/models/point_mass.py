@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A point mass that translates along one to three axes of the world."""
+"""Point mass that translates along one to three axes of the world."""
 
 from dataclasses import dataclass
 
@@ -20,15 +20,19 @@ class PointMass(JointSettings):
     """Configuration block of a point mass; coordinates are world positions along `axes`."""
 
     mass: float = key("Mass [kg]", positive=True)
-    model: str = key("Kind of robot", "point_mass", choices=("point_mass",))
-    axes: tuple[str, ...] = key("Axes of the world along which it moves", ("x", "y"), choices=AXES)
-    initial_position: tuple[float, ...] = key("Initial position along its axes [m]", ())
+    model: str = key("Robot model", "point_mass", choices=("point_mass",))
+    axes: tuple[str, ...] = key("Axes of motion in the world", ("x", "y"), choices=AXES)
+    initial_position: tuple[float, ...] = key(
+        "Initial position along the axes [m]; by default zeros", ()
+    )
     brake_damping: float = key(
-        "Joint damping of its own brake without commands [N s/m]", 20.0, minimum=0.0
+        "Damping of the robot's brake, which acts while no commands arrive [N s/m]",
+        20.0,
+        minimum=0.0,
     )
 
     def build(self, name: str) -> Robot:
-        """The robot as a Pinocchio model: one prismatic joint per axis, the mass on the last.
+        """Return the robot as a Pinocchio model: a prismatic joint per axis, the mass on the last.
 
         Raises:
             ScenarioError: Axes repeat, or another key does not fit them.
@@ -48,8 +52,15 @@ class PointMass(JointSettings):
         path = join(name, "initial_position")
         limits = position_limits(model)
         start = configuration_within(path, self.initial_position, model, limits)
-        return Robot(name, model, "tool", start, self.axes, self.brake_damping)
+        return Robot(
+            name=name,
+            model=model,
+            tool_frame="tool",
+            initial_position=start,
+            axes=self.axes,
+            brake_damping=self.brake_damping,
+        )
 
     def description(self, name: str) -> str:
-        """Its URDF, in the world: a ball."""
+        """Return the URDF in the world frame: a sphere."""
         return urdf_text(self.build(name))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The robot models that a scenario can name."""
+"""Robot models that a scenario can name."""
 
 from typing import Protocol
 
@@ -11,17 +11,17 @@ from noninteract_ros.team.robot_topics import RobotTopics
 
 
 class RobotBlock(Protocol):
-    """Configuration of one robot: a dataclass of `schema.key` fields that builds it."""
+    """Configuration block of one robot: a dataclass of `schema.key` fields that builds it."""
 
     def build(self, name: str) -> Robot:
-        """The robot."""
+        """Return the robot."""
 
     def description(self, name: str) -> str:
-        """Its URDF, in the frame of its base."""
+        """Return the URDF in the frame of the base."""
 
     @property
     def topics(self) -> RobotTopics:
-        """Its topics."""
+        """Topics of the robot."""
 
 
 ROBOT_MODELS: dict[str, type[RobotBlock]] = {

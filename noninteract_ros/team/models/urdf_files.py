@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where URDF files are: on disk, in ROS packages, among the robots of example-robot-data."""
+"""Lookup of URDF files: on disk, in ROS packages, in example-robot-data."""
 
 import os
 import sys
@@ -14,16 +14,16 @@ INSTALL = "pip install 'noninteract_ros[robots]'"
 
 
 def read_urdf(key: str, name: str) -> str:
-    """Text of a URDF file.
+    """Return the text of a URDF file.
 
     Args:
-        key: Full key of the scenario, for errors.
-        name: A path, which starts in the working directory unless it is absolute;
+        key: Full key of the scenario, for error messages.
+        name: A path, relative to the working directory unless it is absolute;
             package://<package>/<path in its share folder>; or example-robot-data/<path>, short
             for package://example-robot-data/robots/<path>.
 
     Raises:
-        ScenarioError: There is no such file, or it cannot be read.
+        ScenarioError: The file does not exist or cannot be read.
     """
     path = _find(key, name)
     try:
@@ -34,7 +34,7 @@ def read_urdf(key: str, name: str) -> str:
 
 
 def share_folders() -> list[Path]:
-    """Folders that hold the shared files of packages: of ROS, of this Python and its wheels."""
+    """Return the share folders of packages: of ROS, of this Python and of its wheels."""
     prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(":")), sys.prefix]
     wheels = [str(Path(entry, "cmeel.prefix")) for entry in sys.path]
     return [Path(prefix, "share") for prefix in (*prefixes, *wheels)]
@@ -50,9 +50,7 @@ def _find(key: str, name: str) -> Path:
     first, *rest_of_path = path.parts or ("",)
     if first == EXAMPLES:
         return _in_package(key, name, EXAMPLES, Path("robots", *rest_of_path))
-    allowed = (
-        f"a file (paths start in {Path.cwd()}), {SCHEME}<package>/<path> or {EXAMPLES}/<path>"
-    )
+    allowed = f"a file (relative to {Path.cwd()}), {SCHEME}<package>/<path> or {EXAMPLES}/<path>"
     raise ScenarioError(key, f"no file {name!r}", allowed)
 
 
@@ -72,7 +70,7 @@ def _in_package(key: str, name: str, package: str, rest: Path) -> Path:
 
 
 def _closest(folders: list[Path], name: str, package: str) -> str:
-    """The URDF files whose names are most alike, spelled as `name` is."""
+    """Return the URDF files with the most similar names, in the notation of `name`."""
     start, inner = (SCHEME, "") if name.startswith(SCHEME) else ("", "robots")
     known = [
         f"{start}{package}/{file.relative_to(folder / inner).as_posix()}"

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An arm described by URDF: a file, or the text of a robot_description."""
+"""Arm described by URDF: a file, or the text of a robot_description."""
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
@@ -24,26 +24,26 @@ JOINT_TYPES = ("fixed", "revolute", "continuous", "prismatic")
 class UrdfRobot(ArmSettings):
     """Configuration block of a robot given by URDF.
 
-    Limits of effort, velocity and position are the URDF's unless given here; an effort or a
-    velocity of 0 means no limit. Damping and friction of the URDF are not used: many files hold
-    placeholders there, so friction is what the key `friction` says.
+    Limits of effort, velocity and position are those of the URDF unless given here; an effort or
+    velocity limit of 0 means no limit. Damping and friction of the URDF are not used, since many
+    files hold placeholders there; the key `friction` sets the friction.
     """
 
-    tool_frame: str = key("Link that works; it has the tool point")
-    model: str = key("Kind of robot", "urdf", choices=("urdf",))
+    tool_frame: str = key("Link of the URDF that is the tool frame")
+    model: str = key("Robot model", "urdf", choices=("urdf",))
     urdf: str = key(
         "URDF file: a path, package://<package>/<path>, example-robot-data/<path>; or"
-        " topic:<name>, where a robot_description is published",
+        " topic:<name>, a topic that publishes the robot_description",
         "",
     )
-    urdf_text: str = key("The URDF itself, such as a robot_description, instead of a file", "")
-    locked_joints: tuple[str, ...] = key("Joints that do not move", ())
+    urdf_text: str = key("URDF as text, such as a robot_description, instead of a file", "")
+    locked_joints: tuple[str, ...] = key("Joints that are held fixed", ())
     locked_positions: tuple[float, ...] = key(
         "Position of each locked joint [m or rad]; by default zeros", ()
     )
 
     def build(self, name: str) -> Robot:
-        """The robot as a Pinocchio model without its locked joints.
+        """Return the robot as a Pinocchio model without its locked joints.
 
         Raises:
             ScenarioError: The URDF cannot be used, or a key does not fit it.
@@ -59,7 +59,7 @@ class UrdfRobot(ArmSettings):
         try:
             model = pin.buildModelFromXML(text)
         except ValueError as error:
-            raise ScenarioError(path, "a URDF that the parser refuses", "a valid URDF") from error
+            raise ScenarioError(path, "a URDF that cannot be parsed", "a valid URDF") from error
         model.name = name
         model = _reduced(model, self.locked_joints, self._locked_configuration(name, model))
         for limits in (model.upperEffortLimit, model.upperVelocityLimit):
@@ -68,19 +68,19 @@ class UrdfRobot(ArmSettings):
         if self.tool_frame not in frames:
             allowed = one_of(frames, self.tool_frame)
             raise ScenarioError(join(name, "tool_frame"), repr(self.tool_frame), allowed)
-        return self.arm(name, model, self.tool_frame)
+        return self.robot(name, model, self.tool_frame)
 
     def description(self, name: str) -> str:
-        """The URDF as it was given, in the frame of its base.
+        """Return the URDF as given, in the frame of the base.
 
         Raises:
-            ScenarioError: The file cannot be read, or the topic's text is not in `urdf_text`.
+            ScenarioError: The file cannot be read, or no text was received from the topic.
         """
         path = join(name, "urdf")
         if not self._on_topic:
             return read_urdf(path, self.urdf) if self.urdf else self.urdf_text
         if not self.urdf_text:
-            allowed = "a running program, which waits for it; or what `noninteract describe` makes"
+            allowed = "a running node, which waits for it, or a file by `noninteract describe`"
             raise ScenarioError(path, repr(self.urdf), allowed)
         return self.urdf_text
 
@@ -89,30 +89,31 @@ class UrdfRobot(ArmSettings):
         return self.urdf.startswith(TOPIC)
 
     def _locked_configuration(self, name: str, model: pin.Model) -> np.ndarray:
-        """Configuration of all joints in which the locked ones are where they are to be."""
+        """Return a configuration of all joints with the locked ones at their positions."""
         joints = joint_names(model)
         for joint in self.locked_joints:
             if joint not in joints or self.locked_joints.count(joint) > 1:
                 path = join(name, "locked_joints")
                 raise ScenarioError(path, repr(joint), f"each once: {one_of(joints, joint)}")
         if len(self.locked_joints) == len(joints):
-            allowed = f"at least one joint that moves, of {joints}"
+            allowed = f"at least one movable joint, of {joints}"
             raise ScenarioError(join(name, "locked_joints"), "all joints", allowed)
         path = join(name, "locked_positions")
         if self.locked_positions and not self.locked_joints:
             raise ScenarioError(path, list(self.locked_positions), "none without locked_joints")
         given = per_joint(path, self.locked_positions or (0.0,), self.locked_joints)
-        places = [joints.index(joint) for joint in self.locked_joints]
+        locked = [joints.index(joint) for joint in self.locked_joints]
         positions, limits = np.zeros(len(joints)), np.tile([[-np.inf], [np.inf]], len(joints))
-        positions[places], limits[:, places] = given, position_limits(model)[:, places]
+        positions[locked], limits[:, locked] = given, position_limits(model)[:, locked]
         return configuration_within(path, positions.tolist(), model, limits)
 
 
 def _reduced(model: pin.Model, locked: Sequence[str], q: np.ndarray) -> pin.Model:
-    """The model without the locked joints, at q; joint frames and links have different names.
+    """Return the model without the locked joints, fixed at q.
 
-    URDF allows a joint to be called as a link is. Pinocchio then finds neither; nor does it find
-    a joint whose frame is called otherwise, hence the other name for both meanwhile.
+    URDF allows a joint and a link of the same name. Pinocchio then finds neither by name, nor a
+    joint whose frame has another name. Joint and frame are therefore renamed together meanwhile;
+    in the result, joint frames and links have different names.
     """
     links = {frame.name for frame in model.frames if frame.type == pin.FrameType.BODY}
     for frame in list(model.frames)[1:]:
@@ -130,15 +131,19 @@ def _reduced(model: pin.Model, locked: Sequence[str], q: np.ndarray) -> pin.Mode
 
 
 def _check_joints(path: str, text: str, locked: Sequence[str]) -> None:
-    """Refuses what is no URDF, and joints that this package cannot drive."""
+    """Check that the text is a URDF with supported joints.
+
+    Raises:
+        ScenarioError: The text is no URDF, or a joint is not supported.
+    """
     try:
         root = ElementTree.fromstring(text)
     except ElementTree.ParseError as error:
-        raise ScenarioError(path, f"text that is no XML ({error})", "a URDF") from error
+        raise ScenarioError(path, f"text that is not XML ({error})", "a URDF") from error
     if root.tag != "robot":
         raise ScenarioError(path, f"XML with the root <{root.tag}>", "a URDF: <robot> ...")
     if any("xacro" in element.tag for element in root.iter()):
-        raise ScenarioError(path, "unexpanded xacro", "a URDF, as the program xacro makes it")
+        raise ScenarioError(path, "unexpanded xacro", "a URDF, as generated by xacro")
     for joint in root.findall("joint"):
         name, kind = joint.get("name", ""), joint.get("type", "")
         if kind not in JOINT_TYPES:
@@ -147,4 +152,4 @@ def _check_joints(path: str, text: str, locked: Sequence[str]) -> None:
         mimicked = joint.find("mimic")
         if mimicked is not None and name not in locked:
             found = f"joint {name!r}, which mimics {mimicked.get('joint')!r}"
-            raise ScenarioError(path, found, "joints that move by themselves, or locked_joints")
+            raise ScenarioError(path, found, "independent joints, or an entry in locked_joints")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""URDF of robots that were made from numbers, for viewers and for other programs."""
+"""URDF export of generated robots, for viewers and other programs."""
 
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
@@ -11,20 +11,20 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.team.robot import AXES, Robot
 
 BASE = "base_link"
-UNBOUNDED = 1e6  # [m] URDF knows no slide without ends.
-DENSITY = 2000.0  # [kg/m^3] of drawn bodies: only their size follows from it
-THINNEST = 0.01  # [m] radius of a drawn link
+UNBOUNDED = 1e6  # [m] stands for no limit: URDF has no unlimited prismatic joint
+DENSITY = 2000.0  # [kg/m^3] of drawn bodies; sets their size only
+MIN_RADIUS = 0.01  # [m] of a drawn link
 
 
 def urdf_text(robot: Robot) -> str:
-    """URDF of a robot in the frame of its base: same joints, inertias, limits and tool.
+    """Return the URDF of a robot in the frame of its base: same joints, inertias, limits, tool.
 
-    Links are drawn as rods along their length with a ball where they end, as thick as their mass
-    would make them. A joint without limits of effort or velocity has a 0 there, which this
-    package reads as none. Armature and friction are left out: they are no part of the kinematics.
+    Links are drawn as rods along their length with a sphere at the end; the mass sets the radius.
+    An unlimited effort or velocity is written as 0, which this package reads as no limit. Armature
+    and friction are left out: they are not part of the kinematics.
 
     Args:
-        robot: A chain of revolute joints about z and prismatic joints along axes.
+        robot: Chain of revolute joints about z and prismatic joints along axes.
     """
     model = robot.model
     root = Element("robot", name=robot.name)
@@ -60,8 +60,8 @@ def _add_joint(root: Element, model: pin.Model, joint: int, parent: str) -> None
     SubElement(element, "axis", xyz=axis)
     ends = (low, high) if bounded else (-UNBOUNDED, UNBOUNDED)
     limits = {"effort": model.upperEffortLimit[at], "velocity": model.upperVelocityLimit[at]}
-    texts = {key: _words(value if value < UNBOUNDED else 0.0) for key, value in limits.items()}
-    texts |= {} if name == "continuous" else {"lower": _words(ends[0]), "upper": _words(ends[1])}
+    texts = {key: _text(value if value < UNBOUNDED else 0.0) for key, value in limits.items()}
+    texts |= {} if name == "continuous" else {"lower": _text(ends[0]), "upper": _text(ends[1])}
     SubElement(element, "limit", texts)
 
 
@@ -71,33 +71,33 @@ def _add_link(root: Element, name: str, inertia: pin.Inertia, end: Array) -> Non
         return
     inertial = SubElement(link, "inertial")
     _add_origin(inertial, inertia.lever)
-    SubElement(inertial, "mass", value=_words(inertia.mass))
+    SubElement(inertial, "mass", value=_text(inertia.mass))
     rotational = {
-        f"i{a}{b}": _words(inertia.inertia[i, j])
+        f"i{a}{b}": _text(inertia.inertia[i, j])
         for i, a in enumerate(AXES)
         for j, b in enumerate(AXES[i:], start=i)
     }
     SubElement(inertial, "inertia", rotational)
     length = float(np.linalg.norm(end))
     if length > 0.0:
-        radius = max(THINNEST, (inertia.mass / (DENSITY * np.pi * length)) ** 0.5)
+        radius = max(MIN_RADIUS, (inertia.mass / (DENSITY * np.pi * length)) ** 0.5)
         rod = SubElement(link, "visual")
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end).matrix()
         _add_origin(rod, 0.5 * end, turn)
-        shape = {"radius": _words(radius), "length": _words(length)}
+        shape = {"radius": _text(radius), "length": _text(length)}
         SubElement(SubElement(rod, "geometry"), "cylinder", shape)
     else:
         radius = (3.0 * inertia.mass / (4.0 * np.pi * DENSITY)) ** (1.0 / 3.0)
     ball = SubElement(link, "visual")
     _add_origin(ball, end)
-    SubElement(SubElement(ball, "geometry"), "sphere", radius=_words(radius))
+    SubElement(SubElement(ball, "geometry"), "sphere", radius=_text(radius))
 
 
 def _add_origin(element: Element, place: Array, rotation: Array | None = None) -> None:
     angles = np.zeros(3) if rotation is None else pin.rpy.matrixToRpy(rotation)
-    SubElement(element, "origin", xyz=_words(*place), rpy=_words(*angles))
+    SubElement(element, "origin", xyz=_text(*place), rpy=_text(*angles))
 
 
-def _words(*numbers: float) -> str:
-    """Numbers to the last bit."""
+def _text(*numbers: float) -> str:
+    """Format numbers without loss of precision."""
     return " ".join(repr(float(number)) for number in numbers)

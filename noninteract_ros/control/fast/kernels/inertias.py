@@ -5,13 +5,13 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, compiled, inner
-from noninteract_ros.control.fast.kernels.array_parts import (
+from noninteract_ros.control.fast.kernels.arrays import (
     EDGES,
     MEAN,
     MixingArrays,
     Plan,
-    mixing_parts,
-    own_parts,
+    mixing_arrays,
+    robot_arrays,
 )
 from noninteract_ros.control.fast.kernels.blocks import (
     add_product,
@@ -26,7 +26,7 @@ from noninteract_ros.control.fast.kernels.blocks import (
 @compiled
 def divide_by_inertias(plan: Plan, blocks: Array, mixers: Array, force: Array) -> Array:
     """M_i^-1 f_i of each subtask, shape (n,)."""
-    L, A = own_parts(blocks).L, mixing_parts(mixers)
+    L, A = robot_arrays(blocks).L, mixing_arrays(mixers)
     result = np.empty(len(force))
     for part in range(len(plan.parts)):
         role, lo, hi = plan.parts[part, 0], plan.parts[part, 1], plan.parts[part, 2]

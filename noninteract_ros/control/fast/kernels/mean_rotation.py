@@ -1,12 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mean of the tools' orientations and how it turns, as `TeamRotation` has it."""
+"""The mean of the tools' orientations and its angular velocity, as `TeamRotation` has it."""
 
 import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, inner
 from noninteract_ros.control.fast.kernels import rotations
-from noninteract_ros.control.fast.kernels.array_parts import MixingArrays
+from noninteract_ros.control.fast.kernels.arrays import MixingArrays
 from noninteract_ros.control.fast.kernels.blocks import add_product, invert, product
 from noninteract_ros.control.fast.kernels.robots import Poses
 
@@ -15,18 +15,18 @@ ITERATIONS = 20
 
 
 @inner
-def mean_rotation(weights: Array, turns: Array, phis: Array) -> rotations.Quaternion:
+def mean_rotation(weights: Array, orientations: Array, phis: Array) -> rotations.Quaternion:
     """Mean of the tools' orientations by Newton's method.
 
     Args:
         weights: Weight of each, with sum 1, shape (N,).
-        turns: Their orientations, shape (N, 3, 3).
+        orientations: Their orientations, shape (N, 3, 3).
         phis: Rotation vectors from the mean to the tools, written, shape (N, 3).
     """
     N = len(weights)
     tools = np.empty((N, 4))
     for k in range(N):
-        rotations.put_quaternion(rotations.of_matrix(turns, k), tools, k, FIRST)
+        rotations.put_quaternion(rotations.of_matrix(orientations, k), tools, k, FIRST)
     mean = _first_guess(weights, tools)
     A, B_inverse, work = np.empty((1, 3, 3)), np.empty((1, 3, 3)), np.empty((1, 3, 3))
     for _ in range(ITERATIONS):
@@ -111,12 +111,12 @@ def put_turning(
         for i in range(3):
             for j in range(3):
                 B_rate[0, i, j] += weights[k] * work[0, j, i]
-        add_product(weights[k], jacobians, k, poses.turns, k, found, k)
+        add_product(weights[k], jacobians, k, poses.rotations, k, found, k)
         for i in range(3):  # d(A_k)/dt + A_k [omega_k], row by row.
             turning = rotations.cross(rotations.row_at(jacobians, k, i), omega)
             for j in range(3):
                 work[0, i, j] += turning[j]
-        add_product(weights[k], work, FIRST, poses.turns, k, moved, k)
+        add_product(weights[k], work, FIRST, poses.rotations, k, moved, k)
     for k in range(N):
         product(B_inverse, FIRST, found, k, work, FIRST)
         for i in range(3):

@@ -10,7 +10,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, inner
-from noninteract_ros.control.fast.kernels.array_parts import MixingArrays, Places
+from noninteract_ros.control.fast.kernels.arrays import Indices, MixingArrays
 from noninteract_ros.control.fast.kernels.blocks import (
     add,
     add_product,
@@ -22,7 +22,7 @@ from noninteract_ros.control.fast.kernels.blocks import (
 
 
 @inner
-def mix(steps: Places, framed: bool, A: MixingArrays, own: Array, c: Array, r: Array) -> None:
+def mix(steps: Indices, framed: bool, A: MixingArrays, own: Array, c: Array, r: Array) -> None:
     """A t: writes mean and edges."""
     clear(c, FIRST, c.shape[1])
     for k in range(len(own)):
@@ -40,7 +40,7 @@ def mix(steps: Places, framed: bool, A: MixingArrays, own: Array, c: Array, r: A
 
 @inner
 def add_mix_rate(
-    scale: float, steps: Places, framed: bool, A: MixingArrays, own: Array, c: Array, r: Array
+    scale: float, steps: Indices, framed: bool, A: MixingArrays, own: Array, c: Array, r: Array
 ) -> None:
     """Adds scale (dA/dt) t to mean and edges."""
     h = c.shape[1]
@@ -61,7 +61,7 @@ def add_mix_rate(
 
 @inner
 def unmix(
-    steps: Places, framed: bool, A: MixingArrays, G_inverse: Array, c: Array, r: Array, own: Array
+    steps: Indices, framed: bool, A: MixingArrays, G_inverse: Array, c: Array, r: Array, own: Array
 ) -> None:
     """A^-1: writes the tools' coordinates of own motions; uses up c and, where framed, r."""
     h = c.shape[1]
@@ -83,7 +83,7 @@ def unmix(
 
 @inner
 def mix_transposed(
-    steps: Places, framed: bool, A: MixingArrays, c: Array, r: Array, own: Array
+    steps: Indices, framed: bool, A: MixingArrays, c: Array, r: Array, own: Array
 ) -> None:
     """A' f: writes forces on the tools of forces on mean and edges; uses up c where framed."""
     if framed:
@@ -99,7 +99,7 @@ def mix_transposed(
 
 @inner
 def unmix_transposed(
-    steps: Places, framed: bool, A: MixingArrays, G_inverse: Array, own: Array, c: Array, r: Array
+    steps: Indices, framed: bool, A: MixingArrays, G_inverse: Array, own: Array, c: Array, r: Array
 ) -> None:
     """A^-T f: writes forces on mean and edges of forces on the tools, which are used up."""
     h = c.shape[1]
@@ -120,7 +120,7 @@ def unmix_transposed(
 
 
 @inner
-def inverse_squares(steps: Places, A: MixingArrays, G_inverse: Array) -> Array:
+def inverse_squares(steps: Indices, A: MixingArrays, G_inverse: Array) -> Array:
     """Blocks on the diagonal of A^-1 A^-T, shape (N, h, h).
 
     The column of A^-1 for edge e is 1 beyond the edge minus Q_e, times K_e', where Q_e is the sum

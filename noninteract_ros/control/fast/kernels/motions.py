@@ -9,25 +9,25 @@ import numpy as np
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels import rotations
-from noninteract_ros.control.fast.kernels.array_parts import Places
+from noninteract_ros.control.fast.kernels.arrays import Indices
 
 
 class Numbers(NamedTuple):
     """Where the numbers of a layout are.
 
     Attributes:
-        values: Places of the plain numbers in a value, shape (k,).
-        rates: Places of their rates in a velocity, shape (k,).
-        wound: Places of the rates of angles, shape (w,).
-        quaternions: Places where quaternions begin in a value, shape (r,).
-        angular: Places where their angular velocities begin in a velocity, shape (r,).
+        values: Indices of the plain numbers in a value, shape (k,).
+        rates: Indices of their rates in a velocity, shape (k,).
+        wound: Indices of the rates of angles, shape (w,).
+        quaternions: Indices where quaternions begin in a value, shape (r,).
+        angular: Indices where their angular velocities begin in a velocity, shape (r,).
     """
 
-    values: Places
-    rates: Places
-    wound: Places
-    quaternions: Places
-    angular: Places
+    values: Indices
+    rates: Indices
+    wound: Indices
+    quaternions: Indices
+    angular: Indices
 
 
 @inner

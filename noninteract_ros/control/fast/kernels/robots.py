@@ -7,7 +7,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, compiled, inner
-from noninteract_ros.control.fast.kernels.array_parts import Places, Plan, own_parts
+from noninteract_ros.control.fast.kernels.arrays import Indices, Plan, robot_arrays
 from noninteract_ros.control.fast.kernels.blocks import invert, product, transposed_product
 
 
@@ -16,15 +16,15 @@ class Tools(NamedTuple):
 
     Attributes:
         rows: Axes in use, out of 0, 1 and 2, shape (a,).
-        turning: Whether the tools' rotations count.
+        rotates: Whether the tools' rotations count.
         translations: From the last joint's frame to the tool, shape (N, 3) [m].
         rotations: The same with the constant offsets of orientations, shape (N, 3, 3).
         moves: 1 for each joint that moves its robot's tool, shape (N, m).
         chosen: T of the chosen joints and of the padding, zero elsewhere, shape (N, m, m).
     """
 
-    rows: Places
-    turning: bool
+    rows: Indices
+    rotates: bool
     translations: Array
     rotations: Array
     moves: Array
@@ -38,14 +38,14 @@ class Poses(NamedTuple):
         jacobians: Twists per joint velocity in world axes, shape (N, 6, m).
         rates: Their time derivatives.
         positions: Shape (N, 3).
-        turns: Orientations, shape (N, 3, 3).
+        rotations: Orientations, shape (N, 3, 3).
         twists: Shape (N, 6).
     """
 
     jacobians: Array
     rates: Array
     positions: Array
-    turns: Array
+    rotations: Array
     twists: Array
 
 
@@ -86,7 +86,7 @@ def gather(
     for i in range(3):
         poses.positions[k, i] = translation[i]
         for j in range(3):
-            poses.turns[k, i, j] = rotation[i, j]
+            poses.rotations[k, i, j] = rotation[i, j]
 
 
 @compiled
@@ -100,7 +100,7 @@ def robot_terms(plan: Plan, tools: Tools, poses: Poses, blocks: Array, v: Array)
         blocks: Terms, shape (6, N, m, m); M and C are there already.
         v: Velocity, shape (n,).
     """
-    terms = own_parts(blocks)
+    terms = robot_arrays(blocks)
     N, m = terms.M.shape[0], terms.M.shape[1]
     v_own, work = np.zeros((N, m)), np.empty((1, m, m))
     for i in range(len(v)):
@@ -117,7 +117,7 @@ def robot_terms(plan: Plan, tools: Tools, poses: Poses, blocks: Array, v: Array)
 @inner
 def _move_frame(tools: Tools, poses: Poses, k: int) -> None:
     """From the frame of the last joint to the tool's."""
-    R, t = poses.turns, tools.translations
+    R, t = poses.rotations, tools.translations
     for i in range(3):
         x, y, z = R[k, i, 0], R[k, i, 1], R[k, i, 2]
         poses.positions[k, i] += x * t[k, 0] + y * t[k, 1] + z * t[k, 2]
@@ -149,7 +149,7 @@ def _move_twists(tools: Tools, poses: Poses, k: int, v: Array) -> None:
 @inner
 def _put_own(tools: Tools, poses: Poses, k: int, T: Array, T_rate: Array) -> None:
     """T and its rate: along the axes in use, R' omega of the tool, chosen joints."""
-    J, J_rate, R, twist = poses.jacobians, poses.rates, poses.turns, poses.twists
+    J, J_rate, R, twist = poses.jacobians, poses.rates, poses.rotations, poses.twists
     a, m = len(tools.rows), T.shape[1]
     for i in range(m):
         for row in range(m):
@@ -158,7 +158,7 @@ def _put_own(tools: Tools, poses: Poses, k: int, T: Array, T_rate: Array) -> Non
         for row in range(a):
             T[k, row, i] = J[k, tools.rows[row], i]
             T_rate[k, row, i] = J_rate[k, tools.rows[row], i]
-        if tools.turning:
+        if tools.rotates:
             x, y, z = J[k, 3, i], J[k, 4, i], J[k, 5, i]
             x_rate = J_rate[k, 3, i] - twist[k, 4] * z + twist[k, 5] * y
             y_rate = J_rate[k, 4, i] - twist[k, 5] * x + twist[k, 3] * z

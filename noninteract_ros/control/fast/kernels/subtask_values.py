@@ -8,11 +8,11 @@ import numpy as np
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels import rotations
-from noninteract_ros.control.fast.kernels.array_parts import (
+from noninteract_ros.control.fast.kernels.arrays import (
+    Indices,
     MixingArrays,
-    Places,
     Plan,
-    mixing_parts,
+    mixing_arrays,
 )
 from noninteract_ros.control.fast.kernels.blocks import invert
 from noninteract_ros.control.fast.kernels.mean_rotation import mean_rotation, put_turning
@@ -25,13 +25,13 @@ class Means(NamedTuple):
 
     Attributes:
         weights: Weight of each robot in the mean, shape (N,).
-        order: Places of the values of mean and edges among all, sorted as `Plan` has it.
+        order: Indices of the values of mean and edges among all, sorted as `Plan` has it.
         framed_points: Whether the edges' positions are seen from the mean's frame.
         framed_rotations: Whether their rotations are.
     """
 
     weights: Array
-    order: Places
+    order: Indices
     framed_points: bool
     framed_rotations: bool
 
@@ -65,15 +65,15 @@ def mixing_terms(
         G_inverse: Inverse of the sum of all G_k, shape (1, h, h).
         x: Values of all subtasks, shape (size,).
     """
-    A, a, N = mixing_parts(mixers), len(tools.rows), len(poses.positions)
+    A, a, N = mixing_arrays(mixers), len(tools.rows), len(poses.positions)
     values, phis = np.zeros((N, a + 4)), np.empty((N, 3))
     for k in range(N):
         for i in range(a):
             A.G[k, i, i] = means.weights[k]
             values[0, i] += means.weights[k] * poses.positions[k, tools.rows[i]]
     q, R, omega = (0.0, 0.0, 0.0, 1.0), np.empty((1, 3, 3)), (0.0, 0.0, 0.0)
-    if tools.turning:
-        q = mean_rotation(means.weights, poses.turns, phis)
+    if tools.rotates:
+        q = mean_rotation(means.weights, poses.rotations, phis)
         omega = put_turning(A, a, means.weights, phis, poses)
         rotations.put_quaternion(rotations.positive(q), values, FIRST, a)
     rotations.put_matrix(q, R, FIRST)
@@ -83,7 +83,7 @@ def mixing_terms(
         if plan.steps[step, 3] > 0:
             first, second = second, first
         _put_edge(tools, means, poses, frame, A, plan.steps[step, 0], first, second, values)
-    width = a + 4 if tools.turning else a
+    width = a + 4 if tools.rotates else a
     for i in range(len(means.order)):
         x[means.order[i]] = values[i // width, i % width]
     _put_inverse(plan, A, G_inverse)
@@ -147,7 +147,7 @@ def _put_rotations(
 
     The frame sees R_c' (omega_E - (1 - E) omega_c), omega_E = omega_a - E omega_b in world axes.
     """
-    R, a = poses.turns, A.K.shape[1] - 3
+    R, a = poses.rotations, A.K.shape[1] - 3
     omega = rotations.vector_at(poses.twists, first, rotations.ANGULAR)
     behind = rotations.vector_at(poses.twists, second, rotations.ANGULAR)
     turned = rotations.times(R, first, rotations.transposed_times(R, second, behind))
@@ -195,11 +195,11 @@ def _put_edge(
         seen = rotations.transposed_times(frame.R, FIRST, d)
         for i in range(3):
             values[1 + edge, i] = seen[i]
-    if tools.turning:
+    if tools.rotates:
         framed = means.framed_rotations
         _put_rotations(poses, frame, framed, A, edge, first, second)
-        behind = rotations.inverse(rotations.of_matrix(poses.turns, second))
-        E = rotations.product(rotations.of_matrix(poses.turns, first), behind)
+        behind = rotations.inverse(rotations.of_matrix(poses.rotations, second))
+        E = rotations.product(rotations.of_matrix(poses.rotations, first), behind)
         if framed:
             E = rotations.product(rotations.inverse(frame.q), rotations.product(E, frame.q))
         rotations.put_quaternion(rotations.positive(E), values, 1 + edge, a)

@@ -9,12 +9,12 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, compiled, inner
-from noninteract_ros.control.fast.kernels.array_parts import (
+from noninteract_ros.control.fast.kernels.arrays import (
     MixingArrays,
     Plan,
     RobotArrays,
-    mixing_parts,
-    own_parts,
+    mixing_arrays,
+    robot_arrays,
 )
 from noninteract_ros.control.fast.kernels.blocks import (
     add_product,
@@ -48,14 +48,14 @@ from noninteract_ros.control.fast.kernels.vectors import (
 @compiled
 def velocity(plan: Plan, blocks: Array, mixers: Array, v: Array) -> Array:
     """J v, shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return first_column(mixed(plan, A, times(terms.T, own_joints(plan, terms, v))))
 
 
 @compiled
 def acceleration_of(plan: Plan, blocks: Array, mixers: Array, v: Array, a: Array) -> Array:
     """J a + (dJ/dt) v, shape (n,), with (dJ/dt) v = (dA/dt) T v + A (dT/dt) v."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     h = A.G.shape[1]
     v_own = own_joints(plan, terms, v)
     moved = times(terms.T, own_joints(plan, terms, a))
@@ -72,7 +72,7 @@ def joint_acceleration(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, v: Array, wanted: Array
 ) -> Array:
     """S (a - (dJ/dt) v), shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     h = A.G.shape[1]
     v_own = own_joints(plan, terms, v)
     own = times(terms.T, v_own)
@@ -117,7 +117,7 @@ def coriolis_force(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, e_rate: Array
 ) -> Array:
     """C~_i e_rate_i of each subtask, shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return picked(plan, coriolis(plan, terms, A, G_inverse, spread(plan, e_rate)))
 
 
@@ -126,14 +126,14 @@ def natural_coriolis_force(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, e_rate: Array
 ) -> Array:
     """mu e_rate, shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return first_column(coriolis(plan, terms, A, G_inverse, column(e_rate)))
 
 
 @compiled
 def torque(plan: Plan, blocks: Array, g: Array, v: Array, a: Array) -> Array:
     """M a + C v + g, shape (n,)."""
-    terms = own_parts(blocks)
+    terms = robot_arrays(blocks)
     v_own = own_joints(plan, terms, v)
     force = times(terms.M, own_joints(plan, terms, a))
     for k in range(len(force)):
@@ -147,7 +147,7 @@ def torque(plan: Plan, blocks: Array, g: Array, v: Array, a: Array) -> Array:
 @compiled
 def acceleration_under(plan: Plan, blocks: Array, mixers: Array, torque: Array) -> Array:
     """J M^-1 tau, shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     own, M = own_joints(plan, terms, torque), terms.M.copy()
     for k in range(len(own)):
         factorize(M, k)
@@ -174,7 +174,7 @@ def multiply_by_inertias(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, a: Array
 ) -> Array:
     """S_i' M S_i a_i of each subtask, shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return picked(plan, multiplied(plan, terms, A, G_inverse, spread(plan, a)))
 
 
@@ -183,14 +183,14 @@ def multiply_by_inertia(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, a: Array
 ) -> Array:
     """Lambda a, shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return first_column(multiplied(plan, terms, A, G_inverse, column(a)))
 
 
 @compiled
 def force_of(plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, torque: Array) -> Array:
     """S' tau = A^-T T^-T tau, shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     h, joints = A.G.shape[1], own_joints(plan, terms, torque)
     force = np.empty(joints.shape)
     for k in range(len(force)):
@@ -203,7 +203,7 @@ def force_of(plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, torque:
 @compiled
 def divide_by_inertia(plan: Plan, blocks: Array, mixers: Array, force: Array) -> Array:
     """Lambda^-1 f = A L^-1 A' f, shape (n,)."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     N, h = len(terms.M), A.G.shape[1]
     c, r, own = np.empty((1, h, 1)), np.empty((N - 1, h, 1)), np.empty((N, terms.M.shape[1], 1))
     split(plan, column(force), c, r, own)
@@ -218,7 +218,7 @@ def divide_by_inertia(plan: Plan, blocks: Array, mixers: Array, force: Array) ->
 @compiled
 def inverse_norm(plan: Plan, blocks: Array, mixers: Array, G_inverse: Array) -> float:
     """Frobenius norm of S, not finite where T is singular."""
-    terms, A = own_parts(blocks), mixing_parts(mixers)
+    terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     squares = inverse_squares(plan.steps, A, G_inverse)
     m, h, total = terms.M.shape[1], A.G.shape[1], 0.0
     for k in range(len(terms.M)):

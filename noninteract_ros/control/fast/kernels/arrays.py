@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import inner
 
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 MEAN, EDGES, JOINTS = range(3)
 
 
@@ -23,11 +23,11 @@ class Plan(NamedTuple):
     padded. Sorted coordinates of the subtasks are the mean's h, h of each edge, chosen joints.
 
     Attributes:
-        order: Places of the sorted coordinates in a stacked vector, shape (n,).
+        order: Indices of the sorted coordinates in a stacked vector, shape (n,).
         owner: Subtask of each stacked coordinate, shape (n,).
-        chosen: Places of the chosen joints among N m own coordinates, by subtask and robot,
+        chosen: Indices of the chosen joints among N m own coordinates, by subtask and robot,
             shape (P,).
-        joints: Places of the team's joints among N m padded ones, shape (n,).
+        joints: Indices of the team's joints among N m padded ones, shape (n,).
         steps: A walk over the tree of edges, from the first robot: edge, robot where it is
             reached, the robot behind it, and 1 if that one is the edge's first, otherwise -1;
             shape (N - 1, 4).
@@ -36,13 +36,13 @@ class Plan(NamedTuple):
             or of the chosen joints, it has, from and up to; shape (subtasks, 3).
     """
 
-    order: Places
-    owner: Places
-    chosen: Places
-    joints: Places
-    steps: Places
+    order: Indices
+    owner: Indices
+    chosen: Indices
+    joints: Indices
+    steps: Indices
     framed: bool
-    parts: Places
+    parts: Indices
 
 
 class RobotArrays(NamedTuple):
@@ -91,17 +91,17 @@ class MixingArrays(NamedTuple):
     B: Array
 
 
-OWN_PARTS, MIXING_PARTS = len(RobotArrays._fields), len(MixingArrays._fields)
+ROBOT_ARRAYS, MIXING_ARRAYS = len(RobotArrays._fields), len(MixingArrays._fields)
 
 
 @inner
-def own_parts(blocks: Array) -> RobotArrays:
+def robot_arrays(blocks: Array) -> RobotArrays:
     """Names the terms of the robots, shape (6, N, m, m)."""
     return RobotArrays(blocks[0], blocks[1], blocks[2], blocks[3], blocks[4], blocks[5])
 
 
 @inner
-def mixing_parts(mixers: Array) -> MixingArrays:
+def mixing_arrays(mixers: Array) -> MixingArrays:
     """Names the parts of the mixing, shape (7, N, h, h)."""
     return MixingArrays(
         mixers[0], mixers[1], mixers[2], mixers[3], mixers[4], mixers[5], mixers[6]
