@@ -1,4 +1,4 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a run is: settings, files and the parts that they build."""
+"""Scenarios: settings, files and the parts built from them."""
 
 from noninteract_ros.scenario.scenario import Scenario as Scenario

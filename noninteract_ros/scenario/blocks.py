@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The blocks of a scenario file, each checked by itself."""
+"""Blocks of a scenario file, each validated separately."""
 
 import re
 from collections.abc import Mapping
@@ -21,74 +21,91 @@ from noninteract_ros.team.state_assembler import PREDICTIONS
 DEVICES = ("operator", "joy", "tracker", "keyboard")
 OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console", "tank", *DEVICES)
 LISTINGS = ("robots", "subtasks", "pushes", "surroundings")
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # What may be a part of a topic's name.
-# Every ROS node has these of its own.
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # Valid as a token of a topic name.
+# Parameters that every ROS node declares itself.
 ROS_KEYS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 
 
 @dataclass(frozen=True)
 class General:
-    """The keys of a scenario that belong to no block."""
+    """Keys of a scenario that belong to no block."""
 
     robots: tuple[str, ...] = key("Names of the robots; each has a block of that name")
     subtasks: tuple[str, ...] = key("Names of the subtasks; each has a block of that name")
-    rate: float = key("Ticks per second [Hz]", 1000.0, positive=True, maximum=10000.0)
-    duration: float = key("How long a demo runs [s]", 20.0, positive=True)
-    lockstep: bool = key("Step only when the command that answers a state has come", True)
-    real_time: bool = key("In lockstep: never run ahead of wall time", False)
+    rate: float = key("Control rate [Hz]", 1000.0, positive=True, maximum=10000.0)
+    duration: float = key("Duration of a demo [s]", 20.0, positive=True)
+    lockstep: bool = key(
+        "Lockstep of simulation and controller: each state waits for its command", True
+    )
+    real_time: bool = key("Limit of lockstep to wall time: never faster than real time", False)
     law: str = key("Control law", "energy_gated", choices=LAWS, live=True)
-    gravity: tuple[float, ...] = key("Gravity in the world [m/s^2]", (0.0, 0.0, -9.81))
+    gravity: tuple[float, ...] = key(
+        "Gravitational acceleration in the world [m/s^2]", (0.0, 0.0, -9.81)
+    )
     telemetry_rate: float = key(
-        "Rate of subtask states, energies and external wrenches [Hz]", 250.0, positive=True
+        "Publishing rate of subtask states, energies and external wrenches [Hz]",
+        250.0,
+        positive=True,
     )
     lockstep_sources: tuple[str, ...] = key(
         "Sources that the controller waits for in lockstep, as <subtask>/<source>", ()
     )
     lockstep_timeout: float = key(
-        "Wall time after which a lockstep source counts as absent [s]", 5.0, positive=True
+        "Wall time after which a silent lockstep source is no longer waited for [s]",
+        5.0,
+        positive=True,
     )
     force_sensors: tuple[str, ...] = key(
-        "Robots whose external_wrench the controller's energy account uses", ()
+        "Robots with a force sensor: their external_wrench is used by the energy account", ()
     )
     state_timeout: float = key(
-        "Gap between states after which the controller starts anew [s]", 0.2, positive=True
+        "Gap between states after which the controller resets [s]", 0.2, positive=True
     )
     max_state_skew: float = key(
-        "Age up to which a robot's state is carried on to that of the newest, where robots have"
-        " topics of their own; beyond it the team is held still [s]",
+        "Largest age difference of robot states on separate topics that is bridged by prediction;"
+        " beyond it the team is held [s]",
         0.02,
         positive=True,
     )
     state_prediction: str = key(
-        "What is taken as constant meanwhile; acceleration is measured, and noise with it",
+        "Quantity assumed constant in that prediction; acceleration is measured and amplifies"
+        " noise",
         "velocity",
         choices=PREDICTIONS,
     )
     command_timeout: float = key(
         "Age of a command after which the team brakes, in wall time [s]", 0.1, positive=True
     )
-    push_timeout: float = key("How long a push lasts unless repeated [s]", 0.1, positive=True)
-    transition_time: float = key("Fade of a change of law or gains [s]", 0.2, positive=True)
+    push_timeout: float = key("Duration of a push unless repeated [s]", 0.1, positive=True)
+    transition_time: float = key(
+        "Duration of the transition to another law or other gains [s]", 0.2, positive=True
+    )
     stop_rate: float = key(
-        "Decay rate of the velocity after a stop, in full force 4 / stop_rate after it; of slow"
-        " motions up to twice as much; at most an eighth of the rate [1/s]",
+        "Decay rate of the velocity after a stop, reached 4 / stop_rate after it and up to twice"
+        " as high for slow motions; limited to an eighth of the control rate [1/s]",
         30.0,
         positive=True,
     )
-    pushes: tuple[str, ...] = key("Names of pushes; each has a block of that name", ())
+    pushes: tuple[str, ...] = key("Names of the pushes; each has a block of that name", ())
     surroundings: tuple[str, ...] = key(
-        "Names of objects, doors and walls; each has a block of that name", ()
+        "Names of the objects, doors and walls; each has a block of that name", ()
     )
-    publish_clock: bool = key("Whether robot_team publishes /clock", False)
+    publish_clock: bool = key("Publication of /clock by robot_team", False)
     end_time: float = key(
-        "Time at which robot_team stops for good, as a demo does [s]; 0: never", 0.0, minimum=0.0
+        "Time at which robot_team ends the run, as in a demo [s]; 0: never", 0.0, minimum=0.0
     )
-    start_paused: bool = key("Whether robot_team waits for ~/pause before its first tick", False)
+    start_paused: bool = key("Paused start: robot_team waits for ~/pause before tick 1", False)
 
 
 @dataclass(frozen=True)
 class SubtaskSpec:
-    """One subtask: what it is, how it behaves, who leads it."""
+    """Settings of one subtask.
+
+    Attributes:
+        kind: Block of the kind of subtask.
+        impedance: Impedance of the subtask.
+        input: Sources, authority and bounds of the reference.
+    """
 
     kind: SubtaskBlock
     impedance: ImpedanceSettings
@@ -96,16 +113,20 @@ class SubtaskSpec:
 
 
 def named_blocks(values: Mapping[str, Any]) -> list[str]:
-    """Names of all blocks that are listed, with what they clash with refused."""
+    """Return the names of all listed blocks.
+
+    Raises:
+        ScenarioError: A name is invalid, reserved or repeated.
+    """
     names: list[str] = []
     reserved = {item.name for item in fields(General)} | set(OPTIONAL)
     for listing in LISTINGS:
         for name in _listed(listing, values.get(listing, ())):
             if not NAME.fullmatch(name) or name in reserved:
-                allowed = "names of letters, digits and _ that are no keys of a scenario"
+                allowed = "names of letters, digits and _ that are not keys of a scenario"
                 raise ScenarioError(listing, repr(name), allowed)
             if name in names:
-                raise ScenarioError(listing, repr(name), "names that are used once")
+                raise ScenarioError(listing, repr(name), "unique names")
             names.append(name)
     return names
 
@@ -115,7 +136,11 @@ def _listed(listing: str, names: Any) -> tuple[str, ...]:
 
 
 def block_of(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
-    """The block of a name, which has to be there."""
+    """Return the required block of a name.
+
+    Raises:
+        ScenarioError: The block is missing or is no mapping.
+    """
     block = values.get(name)
     if not isinstance(block, Mapping):
         found = "nothing" if block is None else repr(block)
@@ -124,12 +149,12 @@ def block_of(values: Mapping[str, Any], name: str) -> Mapping[str, Any]:
 
 
 def load_optional(block: type, values: Mapping[str, Any], name: str) -> Any:
-    """A block that may be left out; then None."""
+    """Load an optional block; return None if it is missing."""
     return load(block, block_of(values, name), name) if name in values else None
 
 
 def load_robot(name: str, values: Mapping[str, Any]) -> RobotBlock:
-    """The block of a robot, of the model that it names."""
+    """Load the block of a robot, of the class selected by its key `model`."""
     model = values.get("model", "point_mass")
     if not isinstance(model, str) or model not in ROBOT_MODELS:
         raise ScenarioError(f"{name}.model", repr(model), one_of(ROBOT_MODELS, str(model)))
@@ -137,7 +162,7 @@ def load_robot(name: str, values: Mapping[str, Any]) -> RobotBlock:
 
 
 def description_topics(values: Mapping[str, Any]) -> dict[str, str]:
-    """Topics of the robots whose descriptions have not come yet, by robot."""
+    """Return the topics of robot descriptions that were not received yet, by robot."""
     blocks = {name: values.get(name) for name in values.get("robots", ())}
     return {
         name: block["urdf"].removeprefix(TOPIC)
@@ -149,7 +174,7 @@ def description_topics(values: Mapping[str, Any]) -> dict[str, str]:
 
 
 def load_surrounding(name: str, values: Mapping[str, Any]) -> SurroundingBlock:
-    """The block of an object, a door or a wall."""
+    """Load the block of an object, a door or a wall."""
     kind = values.get("kind")
     if not isinstance(kind, str) or kind not in SURROUNDINGS:
         found = "nothing" if kind is None else repr(kind)
@@ -158,7 +183,7 @@ def load_surrounding(name: str, values: Mapping[str, Any]) -> SurroundingBlock:
 
 
 def load_subtask(name: str, values: Mapping[str, Any]) -> SubtaskSpec:
-    """The blocks of a subtask: its kind, its impedance and its input."""
+    """Load the settings of a subtask: kind, impedance and input."""
     kind = kind_named(f"{name}.kind", values.get("kind"))
     blocks = (kind, ImpedanceSettings, InputSettings)
     known = tuple(item.name for block in blocks for item in keys_of(block))
@@ -166,16 +191,16 @@ def load_subtask(name: str, values: Mapping[str, Any]) -> SubtaskSpec:
         if item not in known:
             raise ScenarioError(join(name, item), "an unknown key", one_of(known, item))
     return SubtaskSpec(
-        load(kind, values, name, ignore=known),
-        load(ImpedanceSettings, values, name, ignore=known),
-        load(InputSettings, values, name, ignore=known),
+        kind=load(kind, values, name, ignore=known),
+        impedance=load(ImpedanceSettings, values, name, ignore=known),
+        input=load(InputSettings, values, name, ignore=known),
     )
 
 
 def load_planner(
     scenario: Mapping[str, Any],
 ) -> tuple[PlannerSettings | None, dict[str, Formation]]:
-    """The block of the planner, if there is one, and those of its formations."""
+    """Load the block of the planner, or None, and the blocks of its formations."""
     if "planner" not in scenario:
         return None, {}
     values = block_of(scenario, "planner")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenario files: where they are, and their content as nested values."""
+"""Scenario files: lookup, and content as nested values."""
 
 import os
 import sys
@@ -17,10 +17,10 @@ PACKAGE = "noninteract_ros"
 
 
 def load_scenario(path: Path) -> Scenario:
-    """The checked scenario of a file.
+    """Load and validate the scenario of a file.
 
     Raises:
-        ScenarioError: The file is wrong; the error names the file and the key.
+        ScenarioError: The file is invalid; the error names the file and the key.
     """
     try:
         return Scenario.from_dict(read_parameters(path))
@@ -31,7 +31,7 @@ def load_scenario(path: Path) -> Scenario:
 
 
 def read_parameters(path: Path) -> dict[str, Any]:
-    """Nested parameters of a scenario file, those of all its nodes merged.
+    """Return the nested parameters of a scenario file, merged over all its nodes.
 
     Raises:
         ScenarioError: The file is missing or is no parameter file.
@@ -47,7 +47,7 @@ def read_parameters(path: Path) -> dict[str, Any]:
 
 
 def read_yaml(path: Path) -> Any:
-    """Content of a YAML file.
+    """Return the content of a YAML file.
 
     Raises:
         ScenarioError: The file cannot be read or is no YAML.
@@ -62,7 +62,7 @@ def read_yaml(path: Path) -> Any:
 
 
 def nest(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Nested blocks of dotted keys."""
+    """Convert dotted keys to nested blocks."""
     nested: dict[str, Any] = {}
     for name, value in values.items():
         block, *rest = name.split(".")
@@ -86,10 +86,11 @@ def _merge(old: dict[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def for_console(values: Mapping[str, Any], port: int) -> dict[str, Any]:
-    """A scenario whose human is a person at the console.
+    """Return a scenario with a person at the console as its human source.
 
-    It runs in lockstep that keeps to wall time: on a machine that is too slow for its rate it runs
-    slower, and as exactly. Nobody waits for the person, and nobody else speaks for them.
+    It runs in lockstep, limited to wall time: on a machine too slow for the control rate it runs
+    slower, with the same result. The controller does not wait for the person, and no other source
+    replaces them.
     """
     changed = {name: item for name, item in values.items() if name != "haptic"}
     sources = values.get("lockstep_sources", ())
@@ -105,7 +106,7 @@ def for_console(values: Mapping[str, Any], port: int) -> dict[str, Any]:
 
 
 def config_folders() -> list[Path]:
-    """Folders that hold the package's scenarios: a source tree, an installation, a ROS prefix."""
+    """Return the folders of the package's scenarios: source tree, ROS prefixes, installation."""
     prefixes = [*filter(None, os.environ.get("AMENT_PREFIX_PATH", "").split(":")), sys.prefix]
     shares = [Path(prefix, "share") for prefix in prefixes] + [
         Path(sysconfig.get_path("data"), "share")
@@ -115,7 +116,7 @@ def config_folders() -> list[Path]:
 
 
 def known_scenarios() -> dict[str, Path]:
-    """Files of all scenarios that can be called by a name."""
+    """Return the files of all scenarios that can be given by name."""
     known: dict[str, Path] = {}
     for folder in reversed(config_folders()):
         known.update({file.stem: file for file in sorted(folder.glob("*.yaml"))})
@@ -123,10 +124,10 @@ def known_scenarios() -> dict[str, Path]:
 
 
 def find_scenario(name: str) -> Path:
-    """The file of a scenario given by its path or by its name.
+    """Return the file of a scenario given by its path or by its name.
 
     Raises:
-        ScenarioError: There is none; the error lists the names there are.
+        ScenarioError: The scenario does not exist; the error lists the known names.
     """
     if Path(name).is_file():
         return Path(name)

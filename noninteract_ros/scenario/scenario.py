@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A scenario: the one file that every program of a run is started with."""
+"""Scenario: the settings shared by all programs of a run."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -49,26 +49,29 @@ from noninteract_ros.team.team import Team
 
 @dataclass(frozen=True)
 class Scenario:
-    """A checked scenario; `build_*` makes the parts of a run.
+    """Validated scenario, with methods that build the parts of a run.
 
     Attributes:
-        general: Keys of no block.
-        robots: Blocks of the robots, by name.
-        subtasks: Subtasks, by name.
-        held: Object that the team holds, or None.
-        haptic: The operator's emulated hand and device, or None.
-        link: The connection between device and team, or None.
-        planner: The relative planner, or None.
-        formations: The planner's formations, by name.
+        general: Keys that belong to no block.
+        robots: Robot blocks, by name.
+        subtasks: Subtask settings, by name.
+        held: Object held by the team, or None.
+        haptic: Emulated hand and haptic device, or None.
+        link: Link between device and team, or None.
+        planner: Formation planner, or None.
+        formations: Formations of the planner, by name.
         pushes: Scheduled pushes, by name.
         surroundings: Objects, doors and walls, by name.
         safety: Behaviour at singularities and joint limits.
-        console: The operator's console, or None.
-        tank: The energy account.
-        operator: What people's devices have in common, or None.
-        joy: Meaning of a gamepad's or space mouse's axes and buttons, or None.
-        tracker: A device that tells its pose, or None.
+        console: Operator's console, or None.
+        tank: Energy tank.
+        operator: Settings common to all input devices, or None.
+        joy: Axes and buttons of a gamepad or space mouse, or None.
+        tracker: Pose tracker, or None.
         keyboard: Keys of a terminal, or None.
+
+    Raises:
+        ScenarioError: Parts do not fit together.
     """
 
     general: General
@@ -91,42 +94,44 @@ class Scenario:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> "Scenario":
-        """Checks nested values, as in a parameter file, and everything they must fit together.
+        """Build a scenario from nested values, as read from a parameter file.
 
         Raises:
-            ScenarioError: A key is wrong; the error names it, what was found and what is allowed.
+            ScenarioError: A key is invalid; the error gives its name, value and allowed values.
         """
         values = {name: value for name, value in values.items() if name not in ROS_KEYS}
         named = named_blocks(values)
         general = load(General, values, ignore=(*named, *OPTIONAL))
         planner, formations = load_planner(values)
-        scenario = cls(
-            general,
-            {name: load_robot(name, block_of(values, name)) for name in general.robots},
-            {name: load_subtask(name, block_of(values, name)) for name in general.subtasks},
-            load_optional(ObjectSettings, values, "object"),
-            load_optional(HapticSettings, values, "haptic"),
-            load_optional(LinkSettings, values, "link"),
-            planner,
-            formations,
-            {name: load(ScheduledPush, block_of(values, name), name) for name in general.pushes},
-            {
+        return cls(
+            general=general,
+            robots={name: load_robot(name, block_of(values, name)) for name in general.robots},
+            subtasks={
+                name: load_subtask(name, block_of(values, name)) for name in general.subtasks
+            },
+            held=load_optional(ObjectSettings, values, "object"),
+            haptic=load_optional(HapticSettings, values, "haptic"),
+            link=load_optional(LinkSettings, values, "link"),
+            planner=planner,
+            formations=formations,
+            pushes={
+                name: load(ScheduledPush, block_of(values, name), name) for name in general.pushes
+            },
+            surroundings={
                 name: load_surrounding(name, block_of(values, name))
                 for name in general.surroundings
             },
-            load_optional(SafetySettings, values, "safety") or SafetySettings(),
-            load_optional(ConsoleSettings, values, "console"),
-            load_optional(TankSettings, values, "tank") or TankSettings(),
-            load_optional(OperatorSettings, values, "operator"),
-            load_optional(JoySettings, values, "joy"),
-            load_optional(TrackerSettings, values, "tracker"),
-            load_optional(KeyboardSettings, values, "keyboard"),
+            safety=load_optional(SafetySettings, values, "safety") or SafetySettings(),
+            console=load_optional(ConsoleSettings, values, "console"),
+            tank=load_optional(TankSettings, values, "tank") or TankSettings(),
+            operator=load_optional(OperatorSettings, values, "operator"),
+            joy=load_optional(JoySettings, values, "joy"),
+            tracker=load_optional(TrackerSettings, values, "tracker"),
+            keyboard=load_optional(KeyboardSettings, values, "keyboard"),
         )
-        scenario.check()
-        return scenario
 
     def parameters(self) -> Iterator[tuple[str, Any, Key, Any]]:
-        """Dotted key, type, rule and value of every key of every block."""
+        """Iterate over dotted key, type, `schema.Key` and value of every key of every block."""
         blocks: list[tuple[str, object | None]] = [("", self.general)]
         blocks += [*self.robots.items(), *self.pushes.items(), *self.surroundings.items()]
         blocks += [("object", self.held), ("haptic", self.haptic), ("link", self.link)]
@@ -141,15 +146,9 @@ class Scenario:
             if block is not None:
                 yield from describe(block, name)
 
-    def check(self) -> None:
-        """Builds every part once, so that nothing is found wrong later.
-
-        Raises:
-            ScenarioError: Parts do not fit together.
-        """
+    def __post_init__(self) -> None:
+        """Build every part once, so that errors appear here and not later."""
         self.safety.check()
-        if self.console:
-            self.console.check()
         self.tank.check()
         if len(self.general.gravity) != 3:
             raise ScenarioError("gravity", list(self.general.gravity), "3 numbers")
@@ -173,7 +172,7 @@ class Scenario:
 
     @property
     def has_robot_state_topics(self) -> bool:
-        """Whether each robot tells its state on a topic of its own."""
+        """True if each robot publishes its state on a topic of its own."""
         return any(block.topics.joint_states_topic for block in self.robots.values())
 
     def _check_topics(self) -> None:
@@ -197,7 +196,7 @@ class Scenario:
         return self.build_stack(self.team)
 
     def build_team(self) -> Team:
-        """The robots as one model."""
+        """Build the robots as one model."""
         robots = [block.build(name) for name, block in self.robots.items()]
         try:
             return Team(robots, self.general.gravity)
@@ -205,7 +204,7 @@ class Scenario:
             raise ScenarioError("robots", list(self.robots), str(error)) from error
 
     def build_stack(self, team: Team) -> SubtaskStack:
-        """The subtasks stacked, with the assumptions of the law checked."""
+        """Build the stack of subtasks, and check the assumptions of the law."""
         subtasks: dict[str, Subtask] = {}
         for name, spec in self.subtasks.items():
             subtasks[name] = spec.kind.build(name, team, subtasks)
@@ -215,7 +214,7 @@ class Scenario:
             raise ScenarioError("subtasks", list(self.subtasks), str(error)) from error
 
     def build_controller(self, team: Team, stack: SubtaskStack) -> TeamController:
-        """The controller, without ROS."""
+        """Build the controller."""
         return TeamController(
             team,
             stack,
@@ -231,26 +230,26 @@ class Scenario:
         )
 
     def build_simulation(self, team: Team, stack: SubtaskStack) -> TeamSimulation:
-        """The simulated team with its object and pushes."""
+        """Build the simulated team with its object, surroundings and pushes."""
         held = SubtaskObject(self.held, stack) if self.held else None
         parts = [item.build(name, team) for name, item in self.surroundings.items()]
         bodies = [body for bodies, _ in parts for body in bodies]
         if held and bodies:
-            raise ScenarioError("object", "a block", "nothing, where surroundings have bodies")
+            raise ScenarioError("object", "a block", "nothing, if surroundings have bodies")
         plant = Plant(team, bodies, [coupling for _, couplings in parts for coupling in couplings])
         return TeamSimulation(plant, self.general.rate, held, list(self.pushes.values()))
 
     def build_haptic(self, stack: SubtaskStack) -> HapticDevice | BilateralLink:
-        """The operator's emulated hand and device, behind its link if there is one."""
+        """Build the emulated hand and device, behind its link if there is one."""
         settings = self._required(self.haptic, "haptic")
-        layout = self._commanded(stack, settings.subtask, "haptic").layout
+        layout = self._subtask(stack, settings.subtask, "haptic").layout
         device = HapticDevice(settings, layout)
         return BilateralLink(device, settings, self.link, layout) if self.link else device
 
     def build_planner(self, stack: SubtaskStack) -> FormationPlanner:
-        """The relative planner."""
+        """Build the formation planner."""
         settings = self._required(self.planner, "planner")
-        task = self._commanded(stack, settings.subtask, "planner")
+        task = self._subtask(stack, settings.subtask, "planner")
         return FormationPlanner(settings, self.formations, task.layout)
 
     @staticmethod
@@ -260,12 +259,13 @@ class Scenario:
         return block
 
     @staticmethod
-    def _commanded(stack: SubtaskStack, subtask: str, block: str) -> Subtask:
+    def _subtask(stack: SubtaskStack, subtask: str, block: str) -> Subtask:
+        """Return the subtask that a block names."""
         if subtask not in stack.names:
             raise ScenarioError(f"{block}.subtask", repr(subtask), one_of(stack.names, subtask))
         return stack.subtasks[stack.names.index(subtask)]
 
 
 def join_source(subtask: str, source: str) -> str:
-    """Name of a source of a subtask, as topics and `lockstep_sources` spell it."""
+    """Return the name of a source of a subtask, as in topics and in `lockstep_sources`."""
     return f"{subtask}/{source}"

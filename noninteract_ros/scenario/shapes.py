@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What robots and surroundings look like: convex bodies, each fixed to a joint.
+"""Shapes of robots and surroundings: convex bodies, each fixed to a joint.
 
-Arms from URDF look as their collision geometry does. Where that is missing, and for arms that are
-made from lengths and masses, a link is a stick from its joint to the next. Point masses are balls.
+Robots from URDF have the shape of their collision geometry. Without collision geometry, and for
+generated arms, each link is a capsule from its joint to the next. Point masses are spheres.
 """
 
 from collections.abc import Iterator
@@ -26,18 +26,18 @@ from noninteract_ros.team.robot import Robot
 
 NO_ROBOT = -1
 PANEL = (0.02, 0.05)  # thickness and height of a door, as shares of its width
-FEW = 6  # balls that are drawn as round as can be
-FINE = 0.08  # longest edge of a triangle, as a share of the radius of all that is seen
+FINE_SPHERES = 6  # largest number of point masses that are drawn with many vertices
+EDGE = 0.08  # longest edge of a triangle, as a share of the scene's radius
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A convex body fixed to a joint.
+    """Convex body fixed to a joint.
 
     Attributes:
-        joint: Number of the joint in the plant's model; 0 is the world.
-        hull: The body in the joint's frame.
-        owner: Number of the robot that it belongs to, or `NO_ROBOT`.
+        joint: Index of the joint in the plant's model; 0 is the world.
+        hull: Body in the joint's frame.
+        owner: Index of the robot that it belongs to, or `NO_ROBOT`.
     """
 
     joint: int
@@ -48,19 +48,19 @@ class Shape:
 def shapes_of(
     scenario: Scenario, plant: Plant, radius: float, longest: float | None = None
 ) -> list[Shape]:
-    """Shapes of all robots and of the bodies around them.
+    """Return the shapes of all robots and of the bodies around them.
 
     Args:
-        scenario: The scenario.
-        plant: Its team and bodies.
-        radius: Of all that is seen [m]; point masses are small against it.
-        longest: Longest edge of a triangle [m]; by default small against the radius.
+        scenario: Scenario of the run.
+        plant: Team and bodies of the scenario.
+        radius: Radius of the whole scene [m], which sets the size of point masses.
+        longest: Longest edge of a triangle [m]; by default a share of the radius.
     """
     found: list[Shape] = []
     for number, (robot, block) in enumerate(
         zip(plant.team.robots, scenario.robots.values(), strict=True)
     ):
-        parts = _ball(block, scenario, radius) if isinstance(block, PointMass) else []
+        parts = _point_mass(block, scenario, radius) if isinstance(block, PointMass) else []
         if isinstance(block, UrdfRobot):
             parts = list(_collision_geometry(block, robot))
         for joint, hull in parts or sticks(robot):
@@ -70,27 +70,27 @@ def shapes_of(
         for name, block in scenario.surroundings.items()
         for joint, hull in _body(name, block, plant)
     ]
-    edge = FINE * radius if longest is None else longest
+    edge = EDGE * radius if longest is None else longest
     return [Shape(shape.joint, shape.hull.refined(edge), shape.owner) for shape in found]
 
 
 def _in_plant(plant: Plant, robot: Robot, joint: int, hull: Hull) -> tuple[int, Hull]:
-    """A shape on a joint of a robot's own model, as one on a joint of the plant's."""
+    """Convert a shape on a joint of a robot's own model to one on a joint of the plant."""
     if joint == 0:
         return 0, hull.transformed(robot.base_pose)
     return plant.model.getJointId(f"{robot.name}/{robot.model.names[joint]}"), hull
 
 
-def _ball(block: PointMass, scenario: Scenario, radius: float) -> list[tuple[int, Hull]]:
-    """The heaviest is drawn largest."""
+def _point_mass(block: PointMass, scenario: Scenario, radius: float) -> list[tuple[int, Hull]]:
+    """Return the sphere of a point mass, largest for the heaviest one."""
     masses = [item.mass for item in scenario.robots.values() if isinstance(item, PointMass)]
     share = 0.08 / np.sqrt(1.0 + 0.25 * len(masses))
     size = share * radius * (block.mass / max(masses)) ** (1.0 / 3.0)
-    return [(len(block.axes), hulls.sphere(size, 60 if len(masses) <= FEW else 24))]
+    return [(len(block.axes), hulls.sphere(size, 60 if len(masses) <= FINE_SPHERES else 24))]
 
 
 def _collision_geometry(block: UrdfRobot, robot: Robot) -> Iterator[tuple[int, Hull]]:
-    """Collision geometry on the joints of a robot's own model; none if meshes are missing."""
+    """Iterate over the collision geometry by joint; empty if meshes are missing."""
     try:
         shapes = list(urdf_shapes(block.description(robot.name), robot))
     except (ScenarioError, ValueError):
@@ -105,7 +105,7 @@ def _collision_geometry(block: UrdfRobot, robot: Robot) -> Iterator[tuple[int, H
 
 
 def _body(name: str, block: object, plant: Plant) -> list[tuple[int, Hull]]:
-    """A rigid object as a box; a door as a panel from its hinge to beyond its handles."""
+    """Return an object as a box, a door as a panel from its hinge to beyond its handles."""
     if isinstance(block, RigidObject):
         return [(plant.model.getJointId(f"{name}/pose"), hulls.box(np.array(block.size)))]
     if isinstance(block, Obstacle):

@@ -147,7 +147,7 @@ def test_the_default_address_is_local() -> None:
     assert not ConsoleSettings(host="0.0.0.0").is_local
     assert not ConsoleSettings(host="192.168.0.7").is_local
     with pytest.raises(ScenarioError, match=r"console\.host"):
-        ConsoleSettings(host="robots.example").check()
+        ConsoleSettings(host="robots.example")
 
 
 def test_an_address_in_use_is_reported(console: Console) -> None:

@@ -11,7 +11,7 @@ from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.files import load_scenario
 
-CONFIG = Path(__file__).resolve().parent.parent / "config"
+CONFIG = Path(__file__).resolve().parents[2] / "config"
 MISSING = object()
 
 
@@ -93,14 +93,14 @@ WRONG = [
     ("robots", None, "robots", ["None", "a list of names"]),
     ("robots", "left", "robots", ["'left'", "a list of names"]),
     ("robots", ["left"], "right", ["unknown key"]),
-    ("robots", ["left", "left"], "robots", ["'left'", "used once"]),
+    ("robots", ["left", "left"], "robots", ["'left'", "unique"]),
     ("robots", ["left", "rate"], "robots", ["'rate'"]),
     ("robots", ["left", "planner"], "robots", ["'planner'"]),
     ("robots", ["left", "ri ght"], "robots", ["'ri ght'", "letters, digits and _"]),
     ("robots", ["left", "2nd"], "robots", ["'2nd'", "letters, digits and _"]),
     ("robots", ["left", "röbot"], "robots", ["'röbot'", "letters, digits and _"]),
     ("robots", ["left", True], "robots", ["True"]),
-    ("robots", ["left", "relative"], "subtasks", ["'relative'", "used once"]),
+    ("robots", ["left", "relative"], "subtasks", ["'relative'", "unique"]),
     ("robots", ["left", "right", "middle"], "middle", ["nothing", "a block of keys"]),
     ("left", 3.0, "left", ["3.0", "a block of keys"]),
     ("left/mass", 0.0, "left.mass", ["0.0", "a number > 0"]),

@@ -126,7 +126,7 @@ def test_thresholds_of_singularities_must_be_in_order():
 
 def test_names_of_surroundings_are_the_scenario_s():
     """They are used once, and are no other keys."""
-    with pytest.raises(ScenarioError, match=r"^surroundings: .*used once"):
+    with pytest.raises(ScenarioError, match=r"^surroundings: .*unique"):
         Scenario.from_dict(values(surroundings=["box", "left"]))
     with pytest.raises(ScenarioError, match=r"^missing: .*nothing"):
         Scenario.from_dict(values(surroundings=["box", "gate", "side", "missing"]))

@@ -340,7 +340,7 @@ def refused(**keys) -> ScenarioError:
         ({"urdf": "x", "urdf_text": "y"}, "urdf", "both", "one of them"),
         ({"urdf_text": "hello"}, "urdf_text", "not XML", "a URDF"),
         ({"urdf_text": "<model/>"}, "urdf_text", "<model>", "<robot>"),
-        ({"urdf_text": "<robot name='x'/>"}, "urdf_text", "parser", "valid URDF"),
+        ({"urdf_text": "<robot name='x'/>"}, "urdf_text", "parsed", "valid URDF"),
         (
             {"urdf_text": planar(kind="planar")},
             "urdf_text",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.fast.kernels.arrays import EDGES, JOINTS, MEAN, Indices, Plan
+from noninteract_ros.control.fast.kernels.array_parts import EDGES, JOINTS, MEAN, Indices, Plan
 from noninteract_ros.control.fast.robot_terms import RobotTerms
 from noninteract_ros.control.fast.robotwise_dynamics import Coordinates
 from noninteract_ros.subtasks.mixing import EdgeMixing, JointMixing, MeanMixing

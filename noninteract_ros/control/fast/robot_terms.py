@@ -5,7 +5,7 @@ import numpy as np
 import pinocchio as pin
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.fast.kernels.arrays import ROBOT_ARRAYS, Indices
+from noninteract_ros.control.fast.kernels.array_parts import ROBOT_ARRAYS, Indices
 from noninteract_ros.control.fast.kernels.robots import Poses, Tools, gather
 from noninteract_ros.team.joined_model import append_model
 from noninteract_ros.team.team import Team
@@ -86,7 +86,7 @@ class RobotTerms:
         return Tools(rows, rotates, self._translations, turned, self._moves, chosen)
 
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """Return blocks of `arrays.RobotArrays` with M and C, and gravity torque, (n,)."""
+        """Return blocks of `array_parts.RobotArrays` with M and C, and gravity torque, (n,)."""
         if self._constant is None:
             return self._evaluate(q, v)
         terms, g, poses = self._constant

@@ -2,7 +2,7 @@
 """The law's terms robot by robot, at a cost linear in the number of robots.
 
 The stacked Jacobian is J = A T: T has one square block for each robot, to its tool's velocity and
-its chosen joints, and A mixes the tools as `kernels.arrays.MixingArrays` has it and leaves
+its chosen joints, and A mixes the tools as `kernels.array_parts.MixingArrays` has it and leaves
 the joints alone. Each robot k has h coordinates of its tool: the velocity of its tool point along
 the axes in use, and its angular velocity in axes of the tool. With them the rotation of a pair
 turns with R_a (omega_a - omega_b), a plain difference like that of the points. No matrix over the
@@ -23,7 +23,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.fast.kernels import task
-from noninteract_ros.control.fast.kernels.arrays import Indices, Plan
+from noninteract_ros.control.fast.kernels.array_parts import Indices, Plan
 from noninteract_ros.control.fast.kernels.inertias import divide_by_inertias
 from noninteract_ros.control.law.decoupling import TaskDynamics, task_terms
 
@@ -52,8 +52,8 @@ class RobotwiseDynamics(TaskDynamics):
 
     Args:
         coordinates: Coordinates of the subtasks.
-        blocks: Terms of the robots, see `kernels.arrays.RobotArrays`.
-        mixers: The mixing A, see `kernels.arrays.Mixing`.
+        blocks: Terms of the robots, see `kernels.array_parts.RobotArrays`.
+        mixers: The mixing A, see `kernels.array_parts.Mixing`.
         G_inverse: Inverse of the sum of all G_k, shape (1, h, h).
         g: Gravity torque, shape (n,).
         desired_inertias: For each subtask, shape (p_i,), or None for its own.

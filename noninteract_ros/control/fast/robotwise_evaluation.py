@@ -5,7 +5,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.fast.coordinates import Roles, coordinates, value_indices
-from noninteract_ros.control.fast.kernels.arrays import MIXING_ARRAYS
+from noninteract_ros.control.fast.kernels.array_parts import MIXING_ARRAYS
 from noninteract_ros.control.fast.kernels.robots import robot_terms
 from noninteract_ros.control.fast.kernels.subtask_values import Means, mixing_terms
 from noninteract_ros.control.fast.robot_terms import RobotTerms

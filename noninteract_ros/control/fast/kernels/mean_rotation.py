@@ -6,7 +6,7 @@ import numpy as np
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, inner
 from noninteract_ros.control.fast.kernels import rotations
-from noninteract_ros.control.fast.kernels.arrays import MixingArrays
+from noninteract_ros.control.fast.kernels.array_parts import MixingArrays
 from noninteract_ros.control.fast.kernels.blocks import add_product, invert, product
 from noninteract_ros.control.fast.kernels.robots import Poses
 

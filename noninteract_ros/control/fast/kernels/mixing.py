@@ -10,7 +10,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, inner
-from noninteract_ros.control.fast.kernels.arrays import Indices, MixingArrays
+from noninteract_ros.control.fast.kernels.array_parts import Indices, MixingArrays
 from noninteract_ros.control.fast.kernels.blocks import (
     add,
     add_product,

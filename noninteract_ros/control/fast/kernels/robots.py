@@ -7,7 +7,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, compiled, inner
-from noninteract_ros.control.fast.kernels.arrays import Indices, Plan, robot_arrays
+from noninteract_ros.control.fast.kernels.array_parts import Indices, Plan, robot_arrays
 from noninteract_ros.control.fast.kernels.blocks import invert, product, transposed_product
 
 

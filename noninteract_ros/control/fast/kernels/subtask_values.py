@@ -8,7 +8,7 @@ import numpy as np
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import FIRST, compiled, inner
 from noninteract_ros.control.fast.kernels import rotations
-from noninteract_ros.control.fast.kernels.arrays import (
+from noninteract_ros.control.fast.kernels.array_parts import (
     Indices,
     MixingArrays,
     Plan,

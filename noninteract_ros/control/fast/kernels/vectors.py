@@ -5,7 +5,7 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import inner
-from noninteract_ros.control.fast.kernels.arrays import MixingArrays, Plan, RobotArrays
+from noninteract_ros.control.fast.kernels.array_parts import MixingArrays, Plan, RobotArrays
 from noninteract_ros.control.fast.kernels.blocks import product
 from noninteract_ros.control.fast.kernels.mixing import mix
 
