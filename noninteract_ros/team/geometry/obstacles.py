@@ -15,7 +15,6 @@ import pinocchio as pin
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import join, key
-from noninteract_ros.team.base_pose import base_pose
 from noninteract_ros.team.geometry import hulls
 from noninteract_ros.team.geometry.bodies import Body, convex_body
 from noninteract_ros.team.geometry.fitting import Capsule, capsule_around
@@ -93,7 +92,7 @@ class BoxObstacle(Obstacle):
         """Return its collision body."""
         size = _vector(join(name, "size"), self.size)
         corners = 0.5 * size * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, 8).T
-        return _convex(name, corners, base_pose(join(name, "pose"), self.pose))
+        return _convex(name, corners, pose_from_list(join(name, "pose"), self.pose))
 
 
 @dataclass(frozen=True)
@@ -143,7 +142,7 @@ class MeshObstacle(Obstacle):
             raise ScenarioError(
                 path, f"{self.mesh!r} ({error})", "a mesh with a volume"
             ) from error
-        return _convex(name, points, base_pose(join(name, "pose"), self.pose))
+        return _convex(name, points, pose_from_list(join(name, "pose"), self.pose))
 
 
 OBSTACLES: dict[str, type[Obstacle]] = {

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Settings common to all arms: base pose, initial position, brake damping."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,9 +14,9 @@ from noninteract_ros.team.joint_settings import (
     joint_names,
     per_joint,
 )
+from noninteract_ros.team.pose_from_list import pose_from_list
 from noninteract_ros.team.robot import AXES, Robot, position_limits
 
-UNIT_TOLERANCE = 1e-3  # of a quaternion's length, for quaternions rounded by hand
 _TRIALS = 4
 
 
@@ -46,7 +45,7 @@ class ArmSettings(JointSettings):
             ScenarioError: A key does not fit the model.
         """
         self.apply_to(name, model)
-        base = _pose(join(name, "base_pose"), self.base_pose)
+        base = pose_from_list(join(name, "base_pose"), self.base_pose)
         brakes = per_joint(join(name, "brake_damping"), self.brake_damping, joint_names(model))
         axes = tool_axes(model, tool_frame, base)
         start = configuration_within(
@@ -62,22 +61,6 @@ class ArmSettings(JointSettings):
             brake_damping=brakes,
             base_pose=base,
         )
-
-
-def _pose(key: str, numbers: Sequence[float]) -> pin.SE3:
-    """Return the pose of position [m] and quaternion: x, y, z, qx, qy, qz, qw.
-
-    Raises:
-        ScenarioError: The count is not seven, or the quaternion is not of unit length.
-    """
-    if len(numbers) != 7:
-        raise ScenarioError(key, list(numbers), "7 numbers: x y z qx qy qz qw")
-    rotation = np.array(numbers[3:])
-    length = np.linalg.norm(rotation)
-    if abs(length - 1.0) > UNIT_TOLERANCE:
-        found = f"{list(numbers)} with a quaternion of length {length:.4g}"
-        raise ScenarioError(key, found, "x y z qx qy qz qw with a quaternion of length 1")
-    return pin.XYZQUATToSE3(np.array([*numbers[:3], *(rotation / length)]))
 
 
 def tool_axes(model: pin.Model, tool_frame: str, base: pin.SE3) -> tuple[str, ...]:
