@@ -19,6 +19,7 @@ from noninteract_ros.team.geometry import hulls
 from noninteract_ros.team.geometry.bodies import Body, convex_body
 from noninteract_ros.team.geometry.fitting import Capsule, capsule_around
 from noninteract_ros.team.geometry.hulls import Hull
+from noninteract_ros.team.pose_from_list import pose_from_list
 from noninteract_ros.team.team import Team
 
 EXTENT = (2.0, 2.0, 0.005)  # [m] of a plane as it is drawn
