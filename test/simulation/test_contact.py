@@ -13,7 +13,7 @@ WALL = WallContact(("a",), np.array([0.2, 0.1, 0.0]), np.array([0.6, 0.8, 0.0]),
 
 
 def motion(rng: np.random.Generator, speed: float = 1.0, size: float = 0.3) -> FrameMotion:
-    """A frame near the origin, anyhow turned and moving."""
+    """Return a frame near the origin with random orientation and motion."""
     return FrameMotion(
         rng.uniform(-size, size, 3),
         Rotation.from_rotvec(rng.uniform(-1.0, 1.0, 3)).as_matrix(),
@@ -23,13 +23,13 @@ def motion(rng: np.random.Generator, speed: float = 1.0, size: float = 0.3) -> F
 
 
 def moved(frame: FrameMotion, twist: np.ndarray) -> FrameMotion:
-    """A frame at rest, a small twist (6,) in world axes further."""
+    """Return a frame at rest, displaced by a small twist (6,) in world axes."""
     rotation = Rotation.from_rotvec(twist[3:]).as_matrix() @ frame.rotation
     return FrameMotion(frame.position + twist[:3], rotation, np.zeros(3), np.zeros(3))
 
 
 def gradient(coupling: Coupling, frames: list[FrameMotion], index: int) -> np.ndarray:
-    """Derivative of the potential by a twist of one frame, shape (6,), by central differences."""
+    """Return the derivative of the potential by a twist of one frame, shape (6,)."""
     found = []
     for direction in np.eye(6):
         values = []
@@ -42,7 +42,7 @@ def gradient(coupling: Coupling, frames: list[FrameMotion], index: int) -> np.nd
 
 
 def power(coupling: Coupling, frames: list[FrameMotion]) -> float:
-    """Power that a coupling gives to its frames."""
+    """Return the power of a coupling on its frames."""
     effect = coupling.effect(tuple(frames))
     return sum(
         wrench @ np.concatenate([frame.velocity, frame.angular_velocity])
@@ -50,12 +50,12 @@ def power(coupling: Coupling, frames: list[FrameMotion]) -> float:
     )
 
 
-def in_wall(rng: np.random.Generator, depth: float, sinking: float) -> FrameMotion:
-    """A frame at a depth in the wall, sinking at a speed and sliding at random."""
+def in_wall(rng: np.random.Generator, depth: float, depth_rate: float) -> FrameMotion:
+    """Return a frame at a depth in the wall with a normal speed and random sliding."""
     along = np.array([-0.8, 0.6, 0.0])
     slide = rng.uniform(-1.0, 1.0, 2)
     position = WALL.point - depth * WALL.normal + slide[0] * along
-    velocity = -sinking * WALL.normal + slide[1] * along
+    velocity = -depth_rate * WALL.normal + slide[1] * along
     return FrameMotion(position, np.eye(3), velocity, rng.uniform(-1.0, 1.0, 3))
 
 
@@ -73,7 +73,7 @@ def test_wrenches_at_rest_are_gradients_of_the_potential():
         np.testing.assert_allclose(wrench, -gradient(WALL, touching, 0), atol=1e-5)
 
 
-def test_a_twisted_grip_turns_back_along_the_log():
+def test_the_torque_of_a_grip_follows_the_rotation_vector():
     """A twist of 0.5 rad about an oblique axis has the torque 20 * 0.5 N m against it."""
     axis = np.array([1.0, 2.0, -2.0]) / 3.0
     start = Rotation.from_rotvec([0.3, -0.2, 0.9])
@@ -86,7 +86,7 @@ def test_a_twisted_grip_turns_back_along_the_log():
     np.testing.assert_allclose(second, -first, atol=1e-12)
 
 
-def test_power_is_lost_or_stored():
+def test_power_is_dissipated_or_stored():
     """Power taken by a coupling is growth of its potential plus what it dissipates, >= 0."""
     rng = np.random.default_rng(1)
     for _ in range(200):
@@ -117,7 +117,7 @@ def test_grips_act_and_react():
 
 
 def test_a_grip_without_rotational_gains_exerts_no_torque():
-    """Frames that are held at a point may turn."""
+    """Frames held at a point rotate freely."""
     rng = np.random.default_rng(3)
     first, _ = Grip(("a", "b"), 100.0, 1.0).effect((motion(rng), motion(rng))).wrenches
     assert first[:3].all()
@@ -129,8 +129,8 @@ def test_a_wall_pushes_along_its_normal_and_never_pulls():
     rng = np.random.default_rng(4)
     pulls = 0
     for depth in np.linspace(-0.05, 0.05, 41):
-        for sinking in np.linspace(-5.0, 5.0, 41):
-            effect = WALL.effect((in_wall(rng, depth, sinking),))
+        for depth_rate in np.linspace(-5.0, 5.0, 41):
+            effect = WALL.effect((in_wall(rng, depth, depth_rate),))
             (wrench,) = effect.wrenches
             force = wrench[:3] @ WALL.normal
             assert force >= 0.0
@@ -144,13 +144,13 @@ def test_a_wall_pushes_along_its_normal_and_never_pulls():
 
 
 def test_a_wall_s_force_is_continuous():
-    """It begins, ends and turns off without a step: neighbouring motions have near forces."""
+    """The force has no step at the start, the end and the cut-off of contact."""
     rng = np.random.default_rng(5)
-    for sinking in (-5.0, -1.0 / WALL.damping, -0.3, 0.0, 2.0):
+    for depth_rate in (-5.0, -1.0 / WALL.damping, -0.3, 0.0, 2.0):
         depths = np.arange(-1e-3, 1e-3, 1e-6)
-        forces = [WALL.effect((in_wall(rng, d, sinking),)).wrenches[0][:3] for d in depths]
+        forces = [WALL.effect((in_wall(rng, d, depth_rate),)).wrenches[0][:3] for d in depths]
         steps = np.linalg.norm(np.diff(forces, axis=0), axis=1)
-        bound = WALL.stiffness * 1e-6 * max(1.0, 1.0 + WALL.damping * sinking)
+        bound = WALL.stiffness * 1e-6 * max(1.0, 1.0 + WALL.damping * depth_rate)
         assert steps.max() <= bound * (1.0 + 1e-6)
     speeds = np.arange(-3.0, 0.0, 1e-3)
     forces = [WALL.effect((in_wall(rng, 0.01, s),)).wrenches[0][:3] for s in speeds]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Keys of surroundings and pushes in a scenario: what is read, what is refused."""
+"""Keys of surroundings and pushes in a scenario: valid and rejected values."""
 
 import pytest
 
@@ -15,7 +15,7 @@ AROUND = {
 
 
 def values(**changes: dict) -> dict:
-    """Two point masses and everything around them, with keys of blocks changed or added."""
+    """Return two point masses with an environment, with keys of blocks changed or added."""
     given = {
         "robots": ["left", "right"],
         "left": {"mass": 1.0},
@@ -30,7 +30,7 @@ def values(**changes: dict) -> dict:
     return given | blocks | {k: v for k, v in changes.items() if k not in AROUND}
 
 
-def test_everything_around_a_team_is_built():
+def test_every_element_of_the_environment_is_built():
     """Bodies, grips and contacts of each kind, in the order of their names."""
     scenario = Scenario.from_dict(values())
     team = scenario.build_team()
@@ -46,8 +46,8 @@ def test_everything_around_a_team_is_built():
     ]
 
 
-def test_robots_that_hold_and_touch_can_be_chosen():
-    """`held_by` and `touched_by` leave the others out."""
+def test_robots_in_contact_can_be_selected():
+    """`held_by` and `touched_by` exclude the other robots."""
     chosen = {"held_by": ["right"]}
     scenario = Scenario.from_dict(
         values(box=chosen, gate=chosen, side={"touched_by": ["left"]})
@@ -59,7 +59,7 @@ def test_robots_that_hold_and_touch_can_be_chosen():
 
 
 def test_every_key_is_a_parameter():
-    """Surroundings, pushes and safety are listed with their values, for ROS to declare."""
+    """Surroundings, pushes and safety are listed with their values, as ROS parameters."""
     listed = {key: value for key, _, _, value in Scenario.from_dict(values()).parameters()}
     assert listed["box.mass"] == 1.0
     assert listed["box.held_by"] == ()
@@ -97,8 +97,8 @@ def test_every_key_is_a_parameter():
         ("shove", {"force": [1.0]}, "shove.force", ["[1.0]", "3 numbers"]),
     ],
 )
-def test_what_is_wrong_is_refused_by_key(block, change, key, words):
-    """Every mistake is refused with the full key, what was found and what is allowed."""
+def test_invalid_values_are_rejected_by_key(block, change, key, words):
+    """Each error has the full key, the value found and the allowed values."""
     given = values(**{block: change})
     given[block] = {name: value for name, value in given[block].items() if value is not None}
     with pytest.raises(ScenarioError) as caught:
@@ -117,15 +117,15 @@ def test_an_object_at_subtask_level_excludes_bodies():
 
 
 def test_thresholds_of_singularities_must_be_in_order():
-    """The law is gone where it has begun to fade: refused."""
+    """`singularity_end` must be below `singularity_begin`."""
     with pytest.raises(
         ScenarioError, match=r"^safety.singularity_end: found 0.4, allowed: < sing"
     ):
         Scenario.from_dict(values(safety={"singularity_end": 0.4}))
 
 
-def test_names_of_surroundings_are_the_scenario_s():
-    """They are used once, and are no other keys."""
+def test_names_of_surroundings_are_unique():
+    """A name is used once and is not another key."""
     with pytest.raises(ScenarioError, match=r"^surroundings: .*unique"):
         Scenario.from_dict(values(surroundings=["box", "left"]))
     with pytest.raises(ScenarioError, match=r"^missing: .*nothing"):

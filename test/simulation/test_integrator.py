@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The integration method on motions whose solution is known."""
+"""Integration method on motions with known solutions."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from noninteract_ros.simulation.integrator import runge_kutta_step
 
 
 class Line:
-    """Numbers, where a tangent vector is a difference."""
+    """Real numbers, with differences as tangent vectors."""
 
     def integrate(self, q, step):
         return q + step
@@ -18,7 +18,7 @@ class Line:
 
 
 def swing(steps: int) -> float:
-    """Error of the state of an oscillator after one second in a number of steps."""
+    """Return the state error of an oscillator after one second in a number of steps."""
     q, v = np.array([1.0]), np.array([0.0])
     for _ in range(steps):
         q, v, _ = runge_kutta_step(Line(), lambda q, v: (-9.0 * q, np.zeros(0)), q, v, 1.0 / steps)

@@ -18,11 +18,11 @@ from noninteract_ros.team.models.planar_arm import PlanarArm
 from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.team import Team
 
-STEP = 0.05  # [s] for which a control torque holds
+STEP = 0.05  # Duration of a control torque [s].
 
 
 def masses(count: int = 2) -> Team:
-    """Point masses in space, 1 m apart."""
+    """Build point masses in space, 1 m apart."""
     blocks = [
         PointMass(1.0 + i, axes=("x", "y", "z"), initial_position=(float(i), 0.1 * i, 0.0))
         for i in range(count)
@@ -31,7 +31,7 @@ def masses(count: int = 2) -> Team:
 
 
 def arms(**keys) -> Team:
-    """Two unlike planar arms in a vertical plane."""
+    """Build two unlike planar arms in a vertical plane."""
     shared = {"plane": "xz", "armature": (0.2,)} | keys
     left = PlanarArm((0.5, 0.4), (1.0, 1.5), initial_position=(1.4, -1.2), **shared)
     base = (1.2, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
@@ -49,7 +49,7 @@ def plant_of(team: Team, **surroundings: SurroundingBlock) -> Plant:
 
 
 def carried(rate: float) -> TeamSimulation:
-    """Three masses that carry a turning box through elastic, lossy grips, and are pushed."""
+    """Build three pushed masses with a rotating box in elastic, damped grips."""
     box = RigidObject(
         "rigid_object", 2.0, (0.6, 0.3, 0.2), (), 150.0, 3.0, 4.0, 0.05
     )  # fmt: skip
@@ -58,7 +58,7 @@ def carried(rate: float) -> TeamSimulation:
 
 
 def at_a_door(rate: float) -> TeamSimulation:
-    """Arms with friction that swing a damped door, one of them pushed at its elbow."""
+    """Build arms with friction at a damped door, one of them pushed at its elbow."""
     door = Door(
         "door", (0.6, 0.0, 0.0), 0.4, (0.0, 1.0, 0.1), 0.3, stiffness=200.0, damping=4.0
     )  # fmt: skip
@@ -67,7 +67,7 @@ def at_a_door(rate: float) -> TeamSimulation:
 
 
 def in_a_wall(rate: float) -> TeamSimulation:
-    """Arms whose tools are and stay in a soft, tilted wall."""
+    """Build arms whose tools stay in a soft, tilted wall."""
     wall = Wall("wall", (0.0, 0.0, 0.1), (0.1, 0.0, 1.0), 12.0, 0.2)
     simulation = TeamSimulation(plant_of(arms(), wall=wall), rate)
     simulation.q = np.array([-1.4, 1.2, -0.9, -1.8])
@@ -75,7 +75,7 @@ def in_a_wall(rate: float) -> TeamSimulation:
 
 
 def run(simulation: TeamSimulation, duration: float, size: float, seed: int = 0) -> float:
-    """Applies random held torques; largest energy out of balance [J]."""
+    """Apply random held torques; return the largest error of the energy balance [J]."""
     rng = np.random.default_rng(seed)
     start, residual = simulation.energy().stored, 0.0
     for _ in range(round(duration / STEP)):
@@ -103,10 +103,10 @@ def test_energy_is_in_balance_to_the_integrator_s_order(
     assert min(abs(account.controls), account.lost) > 1e-3
     assert fine < 1e-5 * abs(account.controls)
     assert coarse / fine > 14.0
-    assert simulation.external_wrenches().any(axis=1).all()  # Nothing has come loose.
+    assert simulation.external_wrenches().any(axis=1).all()  # All contacts are closed.
 
 
-def test_every_term_of_the_balance_matters():
+def test_no_term_of_the_balance_is_zero():
     """Pushes did work, heat was lost, and energy was stored in the runs above."""
     simulation = carried(400.0)
     before = simulation.energy()
@@ -118,8 +118,8 @@ def test_every_term_of_the_balance_matters():
     assert simulation.energy() == before
 
 
-def test_touching_a_wall_costs_order_but_no_energy():
-    """A bounce begins and ends within a tick: the balance still closes, ever better."""
+def test_contact_with_a_wall_reduces_the_order_but_keeps_the_balance():
+    """Contact starts and ends within a tick; the balance error still falls with the tick."""
     wall = Wall("wall", (0.0, 0.0, -0.1), (0.0, 0.0, 1.0), 2e3, 0.2)
     residuals = []
     for rate in (500.0, 2000.0, 8000.0):
@@ -136,7 +136,7 @@ def test_touching_a_wall_costs_order_but_no_energy():
 
 
 def free_flight(count: int, chart: bool = True) -> np.ndarray:
-    """Pose and velocity of a tumbling box after 1 s in a number of steps."""
+    """Return pose and velocity of a tumbling box after 1 s in a number of steps."""
     box = RigidObject("rigid_object", 2.0, (0.6, 0.3, 0.1), (), 0.0, 0.0)
     plant = plant_of(masses(), box=box)
     if not chart:
@@ -153,7 +153,7 @@ def free_flight(count: int, chart: bool = True) -> np.ndarray:
 
 
 def euler() -> np.ndarray:
-    """The same by Euler's equations in world axes with a rotation matrix, by scipy."""
+    """Return the same by Euler's equations with a rotation matrix, integrated by scipy."""
     x, y, z = 0.6, 0.3, 0.1
     inertia = 2.0 / 12.0 * np.array([y * y + z * z, x * x + z * z, x * x + y * y])
 
@@ -194,7 +194,7 @@ def test_arms_do_not_need_the_chart():
 
 
 def door_swing(damping: float) -> float:
-    """Angular velocity of a door after 1 s that nobody holds, from 2 rad/s."""
+    """Return the angular velocity of a free door after 1 s, from 2 rad/s."""
     door = Door("door", (0.0, 0.0, 0.0), 0.5, (0.0, 0.0, 3.0), damping, (), 0.0, 0.0)
     plant = plant_of(masses(), door=door)
     q, v = plant.q0, np.zeros(plant.model.nv)
@@ -210,13 +210,13 @@ def door_swing(damping: float) -> float:
 
 
 def test_a_hinge_is_damped_by_its_inertia():
-    """v' = -(c/I) v; without damping a door swings on."""
+    """v' = -(c/I) v; without damping the velocity is constant."""
     assert door_swing(0.0) == pytest.approx(2.0, rel=1e-12)
     assert door_swing(0.4) == pytest.approx(2.0 * np.exp(-0.8), rel=1e-8)
 
 
-def test_friction_heats():
-    """Masses with friction slow down by v' = -(f/m) v, and all they lose is lost as heat."""
+def test_friction_dissipates():
+    """Masses with friction slow down by v' = -(f/m) v, and the lost energy is dissipated."""
     team = Team([PointMass(2.0, friction=(0.5,)).build("a"), PointMass(4.0).build("b")])
     simulation = TeamSimulation(Plant(team), 100.0)
     simulation.v = np.array([3.0, -1.0, 2.0, 0.5])
@@ -230,8 +230,8 @@ def test_friction_heats():
     assert before.stored - simulation.energy().stored == pytest.approx(lost, rel=1e-9)
 
 
-def test_what_is_held_hangs_in_its_grips():
-    """At rest the grips carry the box's weight, and the tools feel it, masses held up."""
+def test_grips_carry_the_weight_of_a_held_object():
+    """At rest the grips carry the box's weight, which is the wrench on the tools."""
     box = RigidObject("rigid_object", 2.0, (0.6, 0.1, 0.1), (), 500.0, 30.0, 10.0, 1.0)
     simulation = TeamSimulation(plant_of(masses(), box=box), 500.0)
     team = simulation.team
@@ -245,7 +245,7 @@ def test_what_is_held_hangs_in_its_grips():
 
 
 def test_reported_wrenches_are_what_the_grips_exert():
-    """Springs and dampers of the grips, worked out by hand from tool and handle motions."""
+    """Reported wrenches are spring and damper forces, computed from tool and handle motions."""
     simulation = at_a_door(500.0)
     run(simulation, 0.4, 9.0)
     plant, team = simulation.plant, simulation.team
@@ -263,13 +263,13 @@ def test_reported_wrenches_are_what_the_grips_exert():
     found = simulation.external_wrenches()
     np.testing.assert_allclose(found[:, :3], expected, atol=1e-9)
     assert not found[:, 3:].any()
-    # The door feels the opposite: its torque is that of the handles about the hinge.
+    # The opposite forces act on the door, at the handles.
     torque = plant.external_loads(simulation.plant_q, simulation._v).coupling_torque
     assert torque[-1] == pytest.approx(-np.cross(arm, expected).sum(axis=0) @ axis)
 
 
-def test_a_team_that_touches_obeys_its_reported_wrenches():
-    """M a + C v + g = torque - friction + J' w for what is reported on the tools."""
+def test_a_team_in_contact_obeys_its_reported_wrenches():
+    """M a + C v + g = torque - friction + J' w with the reported wrenches w."""
     simulation = at_a_door(20000.0)
     for _ in range(2000):
         simulation.step(simulation.team.gravity(simulation.q))
@@ -314,8 +314,8 @@ ELBOW = np.array([2.0, -1.0, 0.0])
         ),
     ],
 )
-def test_a_push_acts_where_its_frame_is(keys: dict, expected: Callable) -> None:
-    """Levers by hand: the joint torque of a push on tool, elbow, base, and of a torque."""
+def test_a_push_acts_at_its_frame(keys: dict, expected: Callable) -> None:
+    """Joint torques equal the analytic ones for pushes on tool, elbow and base, and torques."""
     team = Team(
         [
             PlanarArm((0.5, 0.3), (1.0, 1.5), initial_position=(0.7, 0.9)).build(name)
@@ -337,15 +337,15 @@ def test_a_push_acts_where_its_frame_is(keys: dict, expected: Callable) -> None:
     np.testing.assert_array_equal(simulation.external_wrenches()[1], sensed)
 
 
-def test_bodies_leave_the_team_s_coordinates_alone():
-    """The team's joints come first, with their armature; bodies start where the tools are."""
+def test_bodies_do_not_change_the_team_s_coordinates():
+    """The team's joints come first, with their armature; bodies start at the tools."""
     team = arms()
     plant = plant_of(team, box=RigidObject("rigid_object", 1.0, held_by=("left",)))
     assert tuple(plant.model.names[1 : team.n + 1]) == team.joint_names
     np.testing.assert_array_equal(plant.model.armature[: team.n], team.model.armature)
     np.testing.assert_array_equal(plant.q0[: team.n], team.q0)
-    outside = plant.external_loads(plant.q0, np.zeros(plant.model.nv))
-    np.testing.assert_allclose(outside.coupling_torque, 0.0, atol=1e-9)
+    loads = plant.external_loads(plant.q0, np.zeros(plant.model.nv))
+    np.testing.assert_allclose(loads.coupling_torque, 0.0, atol=1e-9)
     assert len(plant.couplings) == 1
     rng = np.random.default_rng(0)
     v, load = rng.uniform(-1.0, 1.0, (2, plant.model.nv))
@@ -353,8 +353,8 @@ def test_bodies_leave_the_team_s_coordinates_alone():
     np.testing.assert_allclose(plant.acceleration(plant.q0, v, load)[: team.n], free, rtol=1e-9)
 
 
-def test_a_team_alone_moves_as_with_a_body_that_nobody_holds():
-    """Arms of the closed-form kind, with and without a loose box beside them."""
+def test_a_loose_body_does_not_change_the_team_s_motion():
+    """Closed-form arms move equally with and without a loose box."""
     robots = PlanarArms().robots()
     torque = np.array([1.0, 2.0, -3.0, 0.5])
 
@@ -369,7 +369,7 @@ def test_a_team_alone_moves_as_with_a_body_that_nobody_holds():
 
 
 def test_unknown_frames_are_an_error():
-    """A coupling names frames that exist."""
+    """A coupling with an unknown frame is an error."""
     wall = Wall("wall", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)).build("wall", masses())[1]
     couplings: Sequence = [wall[0].__class__(("nothing",), *[0.0] * 4)]
     with pytest.raises(KeyError, match="nothing"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The object of Section V, held by the paper's team, against closed-form equations."""
+"""Object of Section V, held by the paper's team, against closed-form equations."""
 
 from pathlib import Path
 
@@ -18,7 +18,7 @@ DURATION = 1.2
 
 
 def scenario(rate: float, sign: str = "physical", **keys) -> Scenario:
-    """The paper's scenario at a rate, its object's sign and further keys changed."""
+    """Build the paper's scenario at a rate, with the object's sign and further keys changed."""
     values = yaml.safe_load(PAPER.read_text())["/**"]["ros__parameters"]
     values["rate"] = rate
     values["object"]["sign"] = sign
@@ -26,7 +26,7 @@ def scenario(rate: float, sign: str = "physical", **keys) -> Scenario:
 
 
 def human(t: float) -> Reference:
-    """The paper's operator, from the start."""
+    """Return the paper's operator motion, from the start."""
     angle = 0.79 * t
     return Reference(
         np.array([2.0 * np.sin(angle), 1.0]),
@@ -36,7 +36,7 @@ def human(t: float) -> Reference:
 
 
 def simulate(rate: float, sign: str) -> np.ndarray:
-    """Subtask values at each tick, shape (ticks, 4), under the controller."""
+    """Return subtask values at each tick under the controller, shape (ticks, 4)."""
     given = scenario(rate, sign)
     team = given.build_team()
     stack = given.build_stack(team)
@@ -55,7 +55,7 @@ def simulate(rate: float, sign: str) -> np.ndarray:
 
 
 def exact(rate: float, sign: float, first: np.ndarray) -> np.ndarray:
-    """The scalar equations of the issue, solved coordinate by coordinate.
+    """Solve the scalar equations coordinate by coordinate.
 
     3 e'' + 53 e' + 25 e = s m_o x'' on the cooperative and 0.75 e'' + 25 e' + 50 e =
     s k_o (x - rest) on the relative subtask, with e the value less its reference.
@@ -97,7 +97,7 @@ def test_subtasks_follow_their_scalar_equations(sign, value):
 
 
 def test_the_two_signs_are_not_the_same():
-    """The sign that Section V prints leads elsewhere than the physical one."""
+    """The printed sign of Section V gives another motion than the physical one."""
     first = np.array([0.0, 0.0, 0.6, 0.8])
     gap = np.abs(exact(100.0, -1.0, first) - exact(100.0, 1.0, first)).max(axis=0)
     assert gap[0] > 0.01
@@ -125,7 +125,7 @@ def test_physical_object_carries_momentum_and_strains():
 
 
 def test_reported_wrenches_have_the_object_s_torque():
-    """What is reported on the tools makes the team accelerate beyond its control torque."""
+    """The reported wrenches explain the acceleration beyond the control torque."""
     given = scenario(1000.0)
     team = given.build_team()
     simulation = given.build_simulation(team, given.build_stack(team))
@@ -142,7 +142,7 @@ def test_reported_wrenches_have_the_object_s_torque():
 
 @pytest.mark.parametrize("law", ["noninteracting", "natural", "paper"])
 def test_brake_brings_team_and_object_to_rest(law):
-    """Without commands the team that holds the object comes to rest, whatever the law was."""
+    """Without commands the team with the object comes to rest, after any law."""
     given = scenario(500.0, law=law)
     team = given.build_team()
     simulation = given.build_simulation(team, given.build_stack(team))
@@ -161,8 +161,8 @@ def test_brake_brings_team_and_object_to_rest(law):
         ({"stiffness": 1.0}, "object.rest", ["[]", "2 numbers"]),
     ],
 )
-def test_what_does_not_fit_is_refused(keys, key, words):
-    """Unknown subtasks and a rest value of another size are refused by key."""
+def test_an_object_that_does_not_fit_is_rejected(keys, key, words):
+    """Unknown subtasks and a rest value of the wrong size are rejected by key."""
     with pytest.raises(ScenarioError) as caught:
         held(**keys)
     assert caught.value.key == key
@@ -170,7 +170,7 @@ def test_what_does_not_fit_is_refused(keys, key, words):
 
 
 def test_a_mass_alone_needs_no_rest():
-    """Without stiffness the rest value is nobody's business."""
+    """Without stiffness the rest value is not needed."""
     given, item = held(mass=2.0)
     team = given.build_team()
     A, b = item.torque_terms(team.state(team.q0, np.zeros(4)))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The simulated team against independent integration of the closed-form arms."""
+"""Simulated team against independent integration of the closed-form arms."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def masses(rate: float = 100.0, pushes=()) -> TeamSimulation:
 
 
 def exact(in_tool_axes: bool) -> np.ndarray:
-    """q and v of the closed-form arms at the end, the first of them pushed."""
+    """Return the final q and v of the closed-form arms, the first of them pushed."""
 
     def motion(t, y):
         state = ARMS.state(y[:4], y[4:])
@@ -62,7 +62,7 @@ def test_error_falls_with_the_fourth_power_of_the_step(in_tool_axes):
 
 
 def test_world_and_tool_axes_are_not_the_same():
-    """The two pushes above lead to different places."""
+    """The two pushes above give different motions."""
     assert np.abs(exact(False) - exact(True)).max() > 0.01
 
 
@@ -79,7 +79,7 @@ def test_energy_is_conserved_without_torque():
 
 
 def test_work_of_torque_and_push_is_the_gain_of_energy():
-    """Constant torques do the work torque times way; so does a constant force on a mass."""
+    """Constant torques do the work torque times displacement; so does a constant force."""
     simulation = masses(pushes=[ScheduledPush("a", 0.0, 1.0, (0.0, 3.0, 0.0))])
     torque = np.array([1.0, 0.0, 2.0, -4.0])
     for _ in range(100):
@@ -112,8 +112,8 @@ def test_a_push_lasts_the_same_number_of_ticks_whenever_it_starts():
         assert simulation.v[0] == pytest.approx(0.1, rel=1e-9)
 
 
-def test_a_live_push_lapses_unless_repeated():
-    """A push from outside acts for its duration; a new one takes the place of the last."""
+def test_a_received_push_expires_unless_repeated():
+    """A received push acts for its duration; a new one replaces the last."""
     simulation = masses()
     simulation.push("a", np.array([2.0, 0, 0, 0, 0, 0]), False, 0.1)
     for _ in range(5):
@@ -126,7 +126,7 @@ def test_a_live_push_lapses_unless_repeated():
 
 
 def test_pushes_on_different_robots_add_up():
-    """Two people push two robots at once; one scheduled push comes on top."""
+    """Pushes on two robots and a scheduled push add up."""
     simulation = masses(pushes=[ScheduledPush("a", 0.0, 1.0, (1.0, 0.0, 0.0))])
     simulation.push("a", np.array([0.0, 2.0, 0, 0, 0, 0]), False, 1.0)
     simulation.push("b", np.array([0.0, 0.0, 3.0, 0, 0, 0]), False, 1.0)
@@ -134,7 +134,7 @@ def test_pushes_on_different_robots_add_up():
     np.testing.assert_array_equal(simulation.external_wrenches(), expected)
 
 
-def test_tool_axes_turn_with_the_tool():
+def test_tool_axes_rotate_with_the_tool():
     """A push along the tool's x acts along the last link, force and torque alike."""
     simulation = arms(100.0)
     simulation.push("arm_2", np.array([1.0, 0, 0, 0, 2.0, 0]), True, 1.0)
@@ -176,7 +176,7 @@ def test_the_brake_holds_arms_against_gravity():
 
 
 def test_time_is_counted_in_ticks():
-    """The time of a tick has no drift, and a reset lets it run on."""
+    """The time of a tick has no drift, and continues after a reset."""
     simulation = masses(1000.0)
     for _ in range(300):
         simulation.step(np.array([1.0, 0.0, 0.0, 0.0]))
@@ -190,6 +190,6 @@ def test_time_is_counted_in_ticks():
     assert not simulation.external_wrenches().any()
 
 
-def test_twice_the_same_is_bit_equal():
+def test_equal_runs_are_bit_equal():
     """Two simulations of the same pushes and torques agree in every bit."""
     np.testing.assert_array_equal(simulated(200.0, True), simulated(200.0, True))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A device behind a link: when it speaks, what its account says, and what rotates."""
+"""Bilateral link: samples, energy account and rotations."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ POSE_HAND: dict[str, Any] = {
 
 
 def linked(layout: Layout = PLANE, link: Any = None, **haptic: Any) -> BilateralLink:
-    """A link as a scenario file gives it."""
+    """Build a link from keys of a scenario file."""
     hand = HAND if layout.rates.size == 2 else POSE_HAND
     settings = load(HapticSettings, {**hand, **haptic}, "haptic")
     device = HapticDevice(settings, layout)
@@ -34,7 +34,7 @@ def linked(layout: Layout = PLANE, link: Any = None, **haptic: Any) -> Bilateral
 
 @pytest.mark.parametrize("layout", [PLANE, POSE], ids=["plane", "pose"])
 def test_the_reference_is_the_device_s_motion_a_delay_ago(layout: Layout) -> None:
-    """In free motion without feedback, smoothed by the team's end, positions and rotations."""
+    """The reference is the delayed device motion, in free motion without feedback."""
     link = linked(layout, {"delay": 0.1, "passivity": "tdpa", "bandwidth": 200.0})
     places, references = [], []
     for tick in range(1500):
@@ -42,30 +42,30 @@ def test_the_reference_is_the_device_s_motion_a_delay_ago(layout: Layout) -> Non
         assert reference is not None
         places.append(link.device_motion.position)
         references.append(reference.position)
-    away = layout.difference(np.array(references[400:]), np.array(places[300:-100]))
+    error = layout.difference(np.array(references[400:]), np.array(places[300:-100]))
     moved = layout.difference(np.array(places[400:]), np.array(places[300:-100]))
-    assert np.abs(away).max() < 0.02 * np.abs(moved).max()
+    assert np.abs(error).max() < 0.02 * np.abs(moved).max()
 
 
-def test_equal_links_say_the_same_to_the_bit() -> None:
+def test_equal_links_give_bit_equal_references() -> None:
     """Delays and losses come from the seed alone."""
     link = {"delay": 0.05, "jitter": 0.3, "loss": 0.1}
 
     def run(**more: Any) -> list[float]:
         found = linked(link=link | more)
-        said = []
+        positions = []
         for tick in range(400):
             reference = found.sample(tick / 1e3, np.array([np.sin(0.05 * tick), 1.0]))
             assert reference is not None
-            said += reference.position.tolist()
-        return said
+            positions += reference.position.tolist()
+        return positions
 
     assert run() == run()
     assert run() != run(seed=1)
 
 
-def test_a_sample_that_is_asked_for_again_is_the_same() -> None:
-    """Time that stands still moves nothing."""
+def test_a_repeated_sample_of_a_link_is_the_same() -> None:
+    """A repeated sample time moves nothing."""
     link = linked()
     first = link.sample(0.0)
     second = link.sample(0.001)
@@ -73,21 +73,21 @@ def test_a_sample_that_is_asked_for_again_is_the_same() -> None:
     assert first is not second
 
 
-def test_missed_samples_are_made_up_for() -> None:
-    """In wall time a program may oversleep: the link runs on in its own ticks."""
+def test_missed_samples_are_simulated_later() -> None:
+    """A late sample in wall time simulates all ticks since the last one."""
     steady, late = linked(link={"delay": 0.02}), linked(link={"delay": 0.02})
     push = np.array([1.0, 0.0])
     late.sample(0.0, push)
     for tick in range(61):
         reference = steady.sample(tick / 1e3, push)
-    made_up = late.sample(0.06, push)
+    caught_up = late.sample(0.06, push)
     assert reference is not None
-    assert made_up is not None
-    np.testing.assert_array_equal(made_up.position, reference.position)
+    assert caught_up is not None
+    np.testing.assert_array_equal(caught_up.position, reference.position)
 
 
-def test_after_a_dropout_the_link_starts_where_the_device_is_with_what_energy_is_left() -> None:
-    """Breaks bring no new reserve; a reset does, as a new run."""
+def test_after_a_dropout_the_link_starts_at_the_device_with_the_remaining_energy() -> None:
+    """An interruption does not renew the reserve; a reset does, as a new run."""
     link = linked(link={"delay": 0.05}, dropout_times=[0.2, 0.5])
     before = None
     for tick in range(700):
@@ -107,8 +107,8 @@ def test_after_a_dropout_the_link_starts_where_the_device_is_with_what_energy_is
     assert account.operator_in == account.operator_out == 0.0
 
 
-def test_breaks_one_after_the_other_do_not_empty_the_reserve_again_and_again() -> None:
-    """A hand that gives way to what pushes it gets the reserve out once; the account goes on."""
+def test_repeated_interruptions_do_not_renew_the_reserve() -> None:
+    """A yielding hand receives the reserve once; the account continues."""
     breaks = [edge for n in range(20) for edge in (0.1 + 0.2 * n, 0.12 + 0.2 * n)]
     link = linked(link={"reserve": 0.01}, dropout_times=breaks, motion="still")
     least = put_in = 0.0
@@ -123,7 +123,7 @@ def test_breaks_one_after_the_other_do_not_empty_the_reserve_again_and_again() -
     assert least < 0.0
 
 
-def test_a_rigid_hand_feels_no_link() -> None:
-    """The error names the key that is missing."""
+def test_a_link_requires_a_hand_with_mass() -> None:
+    """The error names the missing key."""
     with pytest.raises(ScenarioError, match=r"haptic\.hand_mass: found 0.*> 0"):
         linked(hand_mass=0.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The link's channel: when packets arrive, in which order, and which never do."""
+"""Channel of the link: delays, order and losses of packets."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ PERIOD = 1e-3
 
 
 def arrivals(settings: LinkSettings, count: int = 4000, direction: int = 0) -> dict[int, float]:
-    """Number of each packet that arrives, one sent per tick, and when, in order of arrival."""
+    """Return number and time of each arrival in order, for one packet per tick."""
     channel: Channel[int] = Channel(settings, direction)
     found = {}
     for tick in range(2 * count):
@@ -23,12 +23,12 @@ def arrivals(settings: LinkSettings, count: int = 4000, direction: int = 0) -> d
 
 
 def test_without_delay_a_packet_arrives_at_once() -> None:
-    """What was sent at a tick is there at the same tick."""
+    """A packet arrives at the tick at which it was sent."""
     assert all(now == n * PERIOD for n, now in arrivals(LinkSettings()).items())
 
 
 def test_delays_stay_within_their_spread_and_use_all_of_it() -> None:
-    """Each packet takes delay (1 -+ jitter), and some nearly the least and the most."""
+    """Each packet takes delay (1 -+ jitter), and some come near both ends of the range."""
     found = arrivals(LinkSettings(delay=0.1, jitter=0.3))
     delays = np.array([now - n * PERIOD for n, now in found.items()])
     assert delays.min() >= 0.07 - 1e-9
@@ -39,7 +39,7 @@ def test_delays_stay_within_their_spread_and_use_all_of_it() -> None:
 
 
 def test_packets_overtake_each_other_only_where_they_may() -> None:
-    """With reordering the order is lost, without it kept."""
+    """The order changes with reordering and is kept without it."""
     jitter = LinkSettings(delay=0.1, jitter=0.3)
     in_order = LinkSettings(delay=0.1, jitter=0.3, reordering=False)
     assert list(arrivals(jitter)) != sorted(arrivals(jitter))
@@ -47,12 +47,12 @@ def test_packets_overtake_each_other_only_where_they_may() -> None:
 
 
 def test_a_share_of_packets_is_lost() -> None:
-    """5 % of 4000 are 200, give or take four standard deviations."""
+    """5 % of 4000 are 200, within four standard deviations."""
     assert 4000 - len(arrivals(LinkSettings(loss=0.05))) == pytest.approx(200, abs=55)
 
 
-def test_fate_depends_on_seed_and_direction_alone() -> None:
-    """The same seed gives the same arrivals; another one, or the way back, others."""
+def test_delay_and_loss_depend_on_seed_and_direction_alone() -> None:
+    """Equal seeds give equal arrivals; other seeds or directions give others."""
     settings = LinkSettings(delay=0.05, jitter=0.3, loss=0.1, seed=3)
     assert arrivals(settings) == arrivals(settings)
     assert arrivals(settings) != arrivals(settings, direction=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What axes, buttons and keys mean."""
+"""Mapping of axes, buttons and keys."""
 
 import math
 from typing import Any
@@ -17,17 +17,17 @@ from noninteract_ros.sources.human.key_state import DIRECTIONS, KeyState
 
 
 def mapping(**keys: Any) -> JoyMapping:
-    """A mapping as a file gives it."""
+    """Build a mapping from keys of a file."""
     return JoyMapping(load(JoySettings, keys, "joy"))
 
 
 def shipped(name: str) -> JoyMapping:
-    """One of the package's mapping files."""
+    """Load one of the package's mapping files."""
     return mapping(**read_parameters(ROOT / "config" / "devices" / f"{name}.yaml")["joy"])
 
 
 def test_directions_are_sums_of_axes_and_buttons() -> None:
-    """Signs, several terms, and buttons against each other; never beyond 1."""
+    """Sums have signs, several terms and pairs of buttons, and are limited to 1."""
     found = mapping(x="-axis1", y="axis0+axis2", z="button1 - button0", deadzone=0.0, exponent=1.0)
     stick, _ = found.read([0.25, 0.5, 0.5], [0, 1])
     np.testing.assert_allclose(stick, [-0.5, 0.75, 1.0, 0.0, 0.0, 0.0])
@@ -36,14 +36,14 @@ def test_directions_are_sums_of_axes_and_buttons() -> None:
 
 
 @pytest.mark.parametrize("text", ["axis", "1", "axis1 axis2", "axis1-", "stick1", "axis1*2"])
-def test_what_is_no_sum_is_refused(text: str) -> None:
-    """The error names the key and shows what one looks like."""
+def test_an_invalid_sum_is_rejected(text: str) -> None:
+    """The error names the key and shows an example."""
     with pytest.raises(ScenarioError, match=r"joy\.yaw: .*button5-button4"):
         mapping(yaw=text)
 
 
-def test_the_enable_button_decides_and_slow_slows() -> None:
-    """Held is the button's state; a button that was not sent is not pressed."""
+def test_the_enable_button_holds_and_the_slow_button_reduces() -> None:
+    """The dead-man's switch is the button's state; an omitted button is not pressed."""
     found = mapping(enable_button=2, slow_button=1, slow_factor=0.5, deadzone=0.0, exponent=1.0)
     for buttons, held in (([0, 0, 1], True), ([0, 0, 0], False), ([1], False), ([], False)):
         assert found.read([0.0, 1.0], buttons)[1] is held
@@ -51,14 +51,14 @@ def test_the_enable_button_decides_and_slow_slows() -> None:
 
 
 @pytest.mark.parametrize("axes", [[0.0], [], [0.0, math.nan], [math.inf, 0.0]])
-def test_a_message_of_another_device_is_refused(axes: list[float]) -> None:
-    """Too few axes, or one that is no number."""
+def test_a_message_of_another_device_is_rejected(axes: list[float]) -> None:
+    """Too few axes and numbers that are not finite are rejected."""
     with pytest.raises(InputError, match=r"axes|finite"):
         mapping().read(axes, [0] * 11)
 
 
-def test_the_gamepad_goes_where_its_sticks_point() -> None:
-    """Left stick up is forward, left is left, right stick up is up and left turns left."""
+def test_the_gamepad_moves_along_its_sticks() -> None:
+    """Left stick: forward and left; right stick: up and rotation to the left."""
     found = shipped("joy_gamepad")
     buttons = [0] * 21
     buttons[9] = 1
@@ -72,7 +72,7 @@ def test_the_gamepad_goes_where_its_sticks_point() -> None:
 
 
 def test_the_space_mouse_is_held_while_it_is_deflected() -> None:
-    """Its axes are in order; at rest, and within the dead zone, nobody holds it."""
+    """Its axes are in order; at rest and within the dead zone it is released."""
     found = shipped("joy_spacenav")
     for axis in range(6):
         stick, held = found.read(np.eye(6)[axis].tolist(), [])
@@ -82,7 +82,7 @@ def test_the_space_mouse_is_held_while_it_is_deflected() -> None:
 
 
 def test_keys_are_held_for_a_while() -> None:
-    """Each direction has a key either way, which counts until its hold has passed."""
+    """Each direction has two keys, which count as held for `key_hold`."""
     assert sorted(DIRECTIONS.values()) == sorted((i, s) for i in range(6) for s in (-1.0, 1.0))
     keys = KeyState(KeyboardSettings(key_hold=0.6))
     keys.press("w", 10.0)
@@ -95,7 +95,7 @@ def test_keys_are_held_for_a_while() -> None:
 
 @pytest.mark.parametrize("key", [" ", "x", "\x1b"])
 def test_space_and_unknown_keys_stop(key: str) -> None:
-    """Whoever strikes a wrong key in alarm is understood."""
+    """Any unassigned key releases all directions."""
     keys = KeyState(KeyboardSettings())
     keys.press("w", 0.0)
     keys.press(key, 0.1)
@@ -103,7 +103,7 @@ def test_space_and_unknown_keys_stop(key: str) -> None:
 
 
 def test_speed_goes_up_and_down_within_bounds() -> None:
-    """Never beyond the full speed."""
+    """The speed does not exceed full speed."""
     keys = KeyState(KeyboardSettings(step=1.25))
     keys.press("-", 0.0)
     assert keys.speed == pytest.approx(0.4)

@@ -21,9 +21,9 @@ def test_the_device_follows_its_equation_of_motion():
     for step, force in enumerate(FORCES):
 
         def rate(t, state, force=force):
-            aim, x, v = INTENDED(t), state[:2], state[2:]
-            pull = force - DAMPING * (v - aim.velocity) - STIFFNESS * (x - aim.position)
-            return np.concatenate([v, aim.acceleration + pull / MASS])
+            intended, x, v = INTENDED(t), state[:2], state[2:]
+            pull = force - DAMPING * (v - intended.velocity) - STIFFNESS * (x - intended.position)
+            return np.concatenate([v, intended.acceleration + pull / MASS])
 
         end = (step + 1) * PERIOD
         solution = solve_ivp(rate, (step * PERIOD, end), state, rtol=1e-12, atol=1e-13)
@@ -36,7 +36,7 @@ def test_the_device_follows_its_equation_of_motion():
 
 
 def test_without_force_the_device_stays_on_the_intended_motion():
-    """The intended motion comes out to the bit."""
+    """The device's motion equals the intended one to the bit."""
     hand = Hand(MASS, DAMPING, STIFFNESS, PERIOD, dim=2)
     hand.advance(np.zeros(2), 1000)
     device = hand.deflect(INTENDED(3.0), np.zeros(2))
@@ -45,7 +45,7 @@ def test_without_force_the_device_stays_on_the_intended_motion():
 
 
 def test_several_periods_at_once_equal_one_after_the_other():
-    """A late sample costs nothing in accuracy while the force stays the same."""
+    """A late sample is exact while the force is constant."""
     at_once, stepwise = (Hand(MASS, DAMPING, STIFFNESS, PERIOD, dim=2) for _ in range(2))
     for force in FORCES[:3]:
         at_once.advance(force, 7)
@@ -68,7 +68,7 @@ def test_a_constant_force_deflects_by_force_over_stiffness():
 
 @pytest.mark.parametrize(("damping", "stiffness"), [(0.0, 0.0), (3.0, 0.0), (0.0, 50.0)])
 def test_a_hand_without_spring_or_damper_is_exact_too(damping, stiffness):
-    """A singular generator is no special case: the first instant is f / m."""
+    """A singular generator needs no special case: the first acceleration is f / m."""
     hand = Hand(2.0, damping, stiffness, 1e-3, dim=1)
     force = np.array([4.0])
     hand.advance(force, 10)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The emulated haptic device: when it speaks, what it feels, and what it refuses."""
+"""Emulated haptic device: samples, feedback and rejected settings."""
 
 import math
 
@@ -17,12 +17,12 @@ PUSH = np.array([5.0, -2.0])
 
 
 def device(dim=2, **values):
-    """A device as a scenario file gives it."""
+    """Build a device from keys of a scenario file."""
     return HapticDevice(load(HapticSettings, values, "haptic"), Layout.scalars(dim))
 
 
-def test_the_papers_operator_needs_only_its_start():
-    """The defaults are the paper's motion in absolute time, silent before 4 s."""
+def test_the_papers_operator_is_the_default():
+    """The defaults are the paper's motion in absolute time, without samples before 4 s."""
     hand = device(start_time=4.0)
     assert hand.sample(3.999) is None
     assert hand.next_sample(0.0) == 4.0
@@ -31,7 +31,7 @@ def test_the_papers_operator_needs_only_its_start():
 
 
 def test_other_motions_count_from_the_start(tmp_path):
-    """Circle, waypoints and replay begin when the device does."""
+    """Circle, waypoints and replay start at `start_time`."""
     file = tmp_path / "hand.csv"
     file.write_text("t,x,y\n100,7,8\n101,9,10\n")
     begins = {
@@ -45,16 +45,16 @@ def test_other_motions_count_from_the_start(tmp_path):
         np.testing.assert_allclose(hand.sample(2.0).position, expected, rtol=1e-15)
 
 
-def test_it_speaks_between_start_and_stop_but_for_its_dropouts():
-    """Samples exist exactly where the keys say, and next_sample agrees."""
+def test_samples_exist_between_start_and_stop_except_in_dropouts():
+    """Samples exist exactly inside the windows, and next_sample agrees."""
     hand = device(
         start_time=0.1,
         stop_time=0.9,
         dropout_times=[0.0, 0.2, 0.5, 0.6, 0.8, 2.0],
         update_rate=100,
     )
-    spoken = [n for n in range(120) if hand.sample(n / 100) is not None]
-    assert spoken == [*range(20, 50), *range(60, 80)]
+    sampled = [n for n in range(120) if hand.sample(n / 100) is not None]
+    assert sampled == [*range(20, 50), *range(60, 80)]
     assert hand.next_sample(0.0) == 0.2
     assert hand.next_sample(0.3) == 0.31
     assert hand.next_sample(0.49) == 0.6
@@ -62,28 +62,28 @@ def test_it_speaks_between_start_and_stop_but_for_its_dropouts():
     assert hand.next_update(0.79) == 0.8
 
 
-def test_the_device_feels_the_feedback():
-    """Its samples are those of the hand impedance about the intended motion."""
+def test_the_feedback_deflects_the_device():
+    """Samples are those of the hand impedance about the intended motion."""
     hand = device(hand_mass=1.2, hand_damping=8.0, hand_stiffness=200.0, update_rate=100.0)
     expected = Hand(1.2, 8.0, 200.0, 0.01, dim=2)
     for n in range(30):
         force = PUSH * n
         if n > 0:
             expected.advance(force, 1)
-        aim = expected.deflect(swing([2.0, 0.0], 0.79, [0.0, 1.0])(n / 100), force)
-        felt = hand.sample(n / 100, force)
+        wanted = expected.deflect(swing([2.0, 0.0], 0.79, [0.0, 1.0])(n / 100), force)
+        found = hand.sample(n / 100, force)
         for name in ("position", "velocity", "acceleration"):
-            np.testing.assert_array_equal(getattr(felt, name), getattr(aim, name))
+            np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
 
 
-def test_a_rigid_hand_feels_nothing():
-    """Without a hand mass the intended motion comes out, whatever pushes."""
+def test_feedback_does_not_deflect_a_rigid_hand():
+    """Without a hand mass the samples are the intended motion under any feedback."""
     hand = device()
     np.testing.assert_array_equal(hand.sample(1.0, PUSH).position, hand.sample(1.0).position)
 
 
 def test_a_repeated_sample_is_the_same():
-    """Asking again for the same instant does not move the hand on."""
+    """A repeated sample time does not advance the hand."""
     hand = device(hand_mass=1.0)
     hand.sample(0.0, PUSH)
     first, again = hand.sample(0.01, PUSH), hand.sample(0.01, PUSH)
@@ -91,8 +91,8 @@ def test_a_repeated_sample_is_the_same():
     np.testing.assert_array_equal(first.acceleration, again.acceleration)
 
 
-def test_a_hand_cut_off_feels_nothing_and_comes_back():
-    """After a long dropout the device is on the intended motion again, though pushed before."""
+def test_no_feedback_acts_during_a_dropout():
+    """After a long dropout the device is back on the intended motion."""
     hand = device(hand_mass=1.0, dropout_times=[0.5, 5.0])
     steady = device()
     for n in range(500):
@@ -106,28 +106,28 @@ def test_a_hand_cut_off_feels_nothing_and_comes_back():
 
 
 def test_a_run_that_is_reset_gives_the_same_samples():
-    """Going back in time starts the hand anew, to the bit."""
+    """An earlier sample time resets the hand exactly."""
     hand = device(hand_mass=1.0, tremor_amplitude=0.01)
     first, second = ([hand.sample(n / 1000, PUSH).position for n in range(50)] for _ in range(2))
     np.testing.assert_array_equal(first, second)
 
 
 def test_tremor_is_part_of_the_intended_motion():
-    """With tremor the position leaves the steady motion by no more than the amplitude."""
+    """With tremor the position deviates from the steady motion by at most the amplitude."""
     off = device(tremor_amplitude=0.01).sample(3.0).position - device().sample(3.0).position
     assert 0.0 < np.abs(off).max() <= 0.01
 
 
 @pytest.mark.parametrize("feedback", [np.zeros(3), np.zeros((2, 1)), np.array([np.nan, 0.0])])
-def test_feedback_that_does_not_fit_is_refused(feedback):
-    """A wrong shape or NaN is an input error and leaves the hand as it was."""
-    hand, untouched = device(hand_mass=1.0), device(hand_mass=1.0)
-    for one in (hand, untouched):
+def test_invalid_feedback_is_rejected(feedback):
+    """A wrong shape or NaN is an input error and does not change the hand."""
+    hand, reference = device(hand_mass=1.0), device(hand_mass=1.0)
+    for one in (hand, reference):
         one.sample(0.0, PUSH)
     with pytest.raises(InputError, match="feedback"):
         hand.sample(0.001, feedback)
     np.testing.assert_array_equal(
-        hand.sample(0.001, PUSH).position, untouched.sample(0.001, PUSH).position
+        hand.sample(0.001, PUSH).position, reference.sample(0.001, PUSH).position
     )
 
 
@@ -161,8 +161,8 @@ def test_feedback_that_does_not_fit_is_refused(feedback):
         (2, {"hand_mass": -1.0}, "haptic.hand_mass: found -1.0"),
     ],
 )
-def test_settings_that_do_not_fit_are_refused_by_key(dim, values, message):
-    """The error names the key, what was found and what is allowed."""
+def test_invalid_settings_are_rejected_by_key(dim, values, message):
+    """The error names the key, the value found and the allowed values."""
     with pytest.raises(ScenarioError) as caught:
         device(dim, **values)
     assert message in str(caught.value)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Input of people: dead-man's switch, dead zone, workspace, clutch; references never jump."""
+"""Operator input: dead-man's switch, dead zone, workspace and clutch."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ GAINS = {"stiffness": [50.0], "damping": [30.0]}
 
 
 def planar() -> Subtask:
-    """The cooperative position of two robots that move in a plane: x and y."""
+    """Build the cooperative position of two planar robots: x and y."""
     values = {
         "robots": ["a", "b"],
         "a": {"mass": 1.0},
@@ -39,7 +39,7 @@ def planar() -> Subtask:
 
 
 class Pose(Subtask):
-    """A subtask of one pose, of which only the layout is used."""
+    """A subtask of one pose; only its layout is used."""
 
     name, elements, axes, rotates = "cooperative", ("cooperative",), ("x", "y", "z"), True
 
@@ -51,22 +51,22 @@ class Pose(Subtask):
 
 
 def limits(task: Subtask, velocity: float = 1.0) -> Array:
-    """Bounds of velocity, acceleration and jerk."""
+    """Return bounds of velocity, acceleration and jerk."""
     return np.outer([velocity, 5.0, 50.0], np.ones(task.layout.dim))
 
 
 def operator_input(task: Subtask, **keys: Any) -> OperatorInput:
-    """Input with a block as a scenario file gives it."""
+    """Build an input from keys of a scenario file."""
     return OperatorInput(load(OperatorSettings, keys, "operator"), task, limits(task))
 
 
 def pose(*position: float, turn: Array = LEVEL) -> Array:
-    """A device's pose."""
+    """Return a pose of a device."""
     return np.concatenate([position, turn])
 
 
-def test_silence_lets_go_until_it_is_taken_hold_of_anew() -> None:
-    """A device that comes back with the button still pressed leads nobody."""
+def test_a_timeout_releases_until_the_switch_is_held_again() -> None:
+    """A device that returns with the button still pressed has no effect."""
     switch = DeadManSwitch(0.25)
     switch.update(0.0, held=True)
     assert switch.is_held(0.25)
@@ -78,8 +78,8 @@ def test_silence_lets_go_until_it_is_taken_hold_of_anew() -> None:
     assert switch.is_held(0.5)
 
 
-def test_a_gap_lets_go_even_if_nobody_asked_meanwhile() -> None:
-    """The next message after a silence finds the switch let go."""
+def test_a_gap_between_updates_releases_the_switch() -> None:
+    """The next update after a gap finds the switch released."""
     switch = DeadManSwitch(0.25)
     switch.update(0.0, held=True)
     switch.update(1.0, held=True)
@@ -87,7 +87,7 @@ def test_a_gap_lets_go_even_if_nobody_asked_meanwhile() -> None:
 
 
 def test_deflections_are_zero_in_the_dead_zone_continuous_and_odd() -> None:
-    """They grow from the edge of the dead zone to 1 at the end, either way alike."""
+    """Deflections grow from the edge of the dead zone to 1, symmetrically."""
     x = np.linspace(-1.2, 1.2, 2401)
     found = deflection(x, 0.1, 1.5)
     np.testing.assert_array_equal(found[np.abs(x) <= 0.1], 0.0)
@@ -97,8 +97,8 @@ def test_deflections_are_zero_in_the_dead_zone_continuous_and_odd() -> None:
     assert (np.diff(found) >= 0.0).all()
 
 
-def test_sticks_become_rates_of_the_coordinates_that_there_are() -> None:
-    """A planar subtask takes x and y; a pose all, with the angular ones in their places."""
+def test_sticks_become_velocities_of_the_subtask_s_coordinates() -> None:
+    """A planar subtask uses x and y; a pose uses all deflections."""
     stick = np.array([1.0, -0.5, 0.25, 0.1, 0.2, 1.0])
     flat = operator_input(planar(), linear_speed=0.2).rate(stick, Reference.at_rest(np.zeros(2)))
     np.testing.assert_allclose(flat, [0.2, -0.1])
@@ -110,8 +110,8 @@ def test_sticks_become_rates_of_the_coordinates_that_there_are() -> None:
     )
 
 
-def test_nobody_leads_out_of_the_workspace() -> None:
-    """At full deflection and any start the shaped motion ends in the box, near its end."""
+def test_velocities_stop_at_the_workspace_boundary() -> None:
+    """At full deflection the shaped motion ends inside the box, near its boundary."""
     task = planar()
     found = operator_input(
         task, linear_speed=1.0, workspace=[1.0, 0.4], workspace_centre=[0.2, 0.0]
@@ -121,7 +121,7 @@ def test_nobody_leads_out_of_the_workspace() -> None:
     stick = np.array([1.0, -1.0, 0.0, 0.0, 0.0, 0.0])
     furthest = np.full(2, -np.inf)
     rate = np.zeros(2)
-    late = [desired.now] * 40  # What the operator's program knows is 40 ms old.
+    late = [desired.now] * 40  # The operator's node receives it 40 ms late.
     for tick in range(4000):
         if tick % 20 == 0:
             rate = found.rate(stick, late[0])
@@ -132,11 +132,11 @@ def test_nobody_leads_out_of_the_workspace() -> None:
     assert (furthest < [0.7005, 0.2005]).all()
     outside = Reference.at_rest([0.9, 0.0])
     assert found.rate(stick, outside)[0] == 0.0
-    assert found.rate(-stick, outside)[0] < 0.0  # Back is always allowed.
+    assert found.rate(-stick, outside)[0] < 0.0  # Motion towards the box is always allowed.
 
 
-def test_a_clutch_leads_from_where_the_subtask_is() -> None:
-    """Taking hold asks for the very value; then the device's motion counts, scaled and turned."""
+def test_a_clutch_starts_at_the_subtask_s_value() -> None:
+    """The first set-point is the present value; then it follows the device's scaled motion."""
     task = Pose()
     found = operator_input(task, linear_scale=2.0, angular_scale=0.5)
     value = np.concatenate([[1.0, 2.0, 3.0], so3.exp(np.array([0.3, -0.2, 0.1]))])
@@ -150,14 +150,14 @@ def test_a_clutch_leads_from_where_the_subtask_is() -> None:
 
 
 def test_a_target_stays_in_the_workspace() -> None:
-    """The device may leave; the set-point stays at the end of the box."""
+    """The set-point stays in the box when the device leaves it."""
     found = operator_input(planar(), workspace=[1.0, 1.0])
     found.engage(pose(0.0, 0.0, 0.0), np.array([0.2, 0.2]))
     np.testing.assert_allclose(found.target(pose(9.0, -0.1, 4.0)), [0.5, 0.1])
 
 
 def test_without_a_clutch_there_is_no_target() -> None:
-    """A pose alone leads nobody."""
+    """A pose without an engaged clutch is an error."""
     found = operator_input(planar())
     with pytest.raises(InputError, match="clutch"):
         found.target(pose(0.0, 0.0, 0.0))
@@ -166,8 +166,8 @@ def test_without_a_clutch_there_is_no_target() -> None:
     assert not found.clutched
 
 
-def test_taking_over_letting_go_and_taking_hold_again_never_jump() -> None:
-    """Pose and rotation: through grabs, releases and device jumps the bounds are kept."""
+def test_engagement_and_release_never_jump() -> None:
+    """Engagement, release and jumps of the device keep the bounds, in position and rotation."""
     task = Pose()
     bounds = limits(task, 0.6)
     found = operator_input(task, linear_scale=1.5)
@@ -177,13 +177,13 @@ def test_taking_over_letting_go_and_taking_hold_again_never_jump() -> None:
     device, held = pose(0.0, 0.0, 0.0), False
     trace: list[Reference] = []
     for tick in range(6000):
-        if tick % 150 == 0:  # The clutch comes and goes at any time, in mid-motion.
+        if tick % 150 == 0:  # The clutch changes at any time, during motion.
             held = not held
             if held:
                 found.engage(device, desired.now.position)
             else:
                 found.release()
-        if tick % 400 == 0 and not held:  # While it is let go the device is put elsewhere.
+        if tick % 400 == 0 and not held:  # A released device is moved elsewhere.
             device = pose(*rng.normal(size=3), turn=so3.exp(rng.normal(size=3)))
         if tick % 20 == 0 and held:
             turn = so3.product(so3.exp(0.02 * rng.normal(size=3)), device[3:])
@@ -196,12 +196,12 @@ def test_taking_over_letting_go_and_taking_hold_again_never_jump() -> None:
     way = layout.difference(position[1:], position[:-1])
     assert np.abs(way[:, :3]).max() <= 0.6 * STEP * (1 + 1e-9)
     assert np.abs(np.diff(velocity[:, :3], axis=0)).max() <= 5.0 * STEP * (1 + 1e-6)
-    # Rotation vectors are bounded, whose rate is not less than the angular velocity.
+    # The bounds are those of rotation vectors, whose rate is at least the angular velocity.
     assert np.linalg.norm(way[:, 3:], axis=1).max() <= np.sqrt(3.0) * 0.6 * STEP * (1 + 1e-6)
     assert np.abs(velocity).max() > 0.3  # It did move.
 
 
-def test_what_does_not_fit_the_subtask_is_refused() -> None:
-    """A workspace of another size; the error names key and size."""
+def test_a_workspace_that_does_not_fit_the_subtask_is_rejected() -> None:
+    """The error names the key and the required size."""
     with pytest.raises(ScenarioError, match=r"operator\.workspace: .*2 numbers"):
         operator_input(planar(), workspace=[1.0, 1.0, 1.0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Intended hand motions: exact derivatives, continuity, and each motion's own law."""
+"""Intended hand motions: exact derivatives, continuity, and the equation of each motion."""
 
 import numpy as np
 import pytest
@@ -63,7 +63,7 @@ def test_the_papers_operator():
 
 
 def test_circle_keeps_its_radius_and_spins_up_smoothly():
-    """It starts at rest at centre + (R, 0), stays on the circle and runs at full rate after."""
+    """The motion starts at rest at centre + (R, 0), stays on the circle and reaches full rate."""
     centre, radius, rate, ramp = np.array([1.0, 2.0, 3.0]), 0.5, -1.7, 0.9
     motion = MOTIONS["circle"]
     start, full = motion(0.0), motion(2.0)
@@ -98,7 +98,7 @@ def test_waypoints_are_the_quintic_hermite_interpolant_at_rest():
 
 
 def test_waypoints_are_met_exactly_and_held_outside():
-    """Each point is reached to the bit at its time; before and after it rests at the ends."""
+    """Each point is reached exactly at its time; before and after the motion is at rest."""
     for t, point in (*zip(TIMES, POINTS, strict=True), (-1.0, POINTS[0]), (9.0, POINTS[-1])):
         now = MOTIONS["waypoints"](t)
         np.testing.assert_array_equal(now.position, point)
@@ -106,7 +106,7 @@ def test_waypoints_are_met_exactly_and_held_outside():
 
 
 def test_moves_rest_in_between():
-    """Between two moves with a gap the motion rests at the value it has reached."""
+    """The motion rests between two moves with a gap."""
     moves = RestToRest([1.0, 5.0], [2.0, 1.0], [[0.0], [4.0], [-4.0]])
     np.testing.assert_array_equal(
         [moves(t).position[0] for t in (0.0, 2.0, 4.0, 7.0)], [0, 2, 4, -4]
@@ -133,8 +133,8 @@ def test_tremor_is_bounded_and_in_its_band():
     assert spectrum[~inside].sum() < 1e-6 * spectrum[inside].sum()
 
 
-def test_tremor_is_settled_by_its_seed():
-    """The same seed trembles alike to the bit, another differently, and no axis like the other."""
+def test_tremor_is_determined_by_its_seed():
+    """Equal seeds give equal bits; other seeds and other axes differ."""
     first, again, other = (
         motions.with_tremor(motions.still([0.0, 0.0]), 0.01, seed, Layout.scalars(2))(
             1.234

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Formations and the changes between them."""
+"""Formations and the transitions between them."""
 
 import math
 
@@ -15,22 +15,22 @@ WIDE, NARROW, TURNED = (1.0, 1.0), (0.2, 1.0), (0.0, -1.0)
 
 
 def planner(*formations, dim=2, rate=100.0):
-    """A planner of formations that are named a, b, c and so on."""
+    """Build a planner of formations named a, b, c and so on."""
     named = dict(zip("abcdef", formations, strict=False))
     settings = PlannerSettings(update_rate=rate, formations=tuple(named))
     return FormationPlanner(settings, named, Layout.scalars(dim))
 
 
-def test_the_papers_formation_is_held_for_good():
-    """One formation at time 0 is a still reference from the first instant on."""
+def test_the_papers_formation_is_held():
+    """One formation at time 0 is a constant reference from the first instant on."""
     plan = planner(Formation(WIDE))
     for t in (0.0, 0.01, 1e4):
         np.testing.assert_array_equal(plan.sample(t).position, WIDE)
         np.testing.assert_array_equal(plan.sample(t).velocity, [0.0, 0.0])
 
 
-def test_nothing_is_asked_before_the_first_formation():
-    """Before its time there is no reference, and next_sample says when there will be."""
+def test_there_is_no_reference_before_the_first_formation():
+    """There is no reference before its time, and next_sample returns that time."""
     plan = planner(Formation(WIDE, time=1.5))
     assert plan.sample(1.49) is None
     assert plan.next_sample(0.0) == 1.5
@@ -40,8 +40,8 @@ def test_nothing_is_asked_before_the_first_formation():
 
 
 @pytest.mark.parametrize("rate", [100.0, 30.0, 7.0])
-def test_there_is_a_reference_wherever_silence_ends(rate):
-    """next_sample and reference agree for starts on and off the grid."""
+def test_there_is_a_reference_at_each_next_sample(rate):
+    """next_sample and sample agree for starts on and off the grid."""
     for start in [*np.random.default_rng(4).uniform(0.0, 3.0, 50).tolist(), 1 / 3, 0.1 + 0.2]:
         plan = planner(Formation(WIDE, time=start), rate=rate)
         first = plan.next_sample(-1.0)
@@ -49,8 +49,8 @@ def test_there_is_a_reference_wherever_silence_ends(rate):
         assert plan.sample(first - 1.0 / rate) is None
 
 
-def test_changes_are_minimum_jerk_between_rests():
-    """Each change is the rest-to-rest quintic over its own duration; formations hold between."""
+def test_transitions_are_minimum_jerk_between_rests():
+    """Each transition is a minimum-jerk move over its duration; formations hold between."""
     plan = planner(
         Formation(WIDE),
         Formation(NARROW, time=2.0, duration=3.0),
@@ -64,8 +64,8 @@ def test_changes_are_minimum_jerk_between_rests():
         np.testing.assert_allclose(now.acceleration, then.acceleration, atol=1e-14)
 
 
-def test_a_change_may_begin_where_the_last_one_ends():
-    """Changes that touch do not overlap."""
+def test_a_transition_may_start_where_the_last_one_ends():
+    """Adjacent transitions do not overlap."""
     plan = planner(Formation(WIDE), Formation(NARROW, 0.0, 1.0), Formation(TURNED, 1.0, 2.0))
     np.testing.assert_array_equal(plan.sample(1.0).position, NARROW)
     np.testing.assert_array_equal(plan.sample(math.pi).position, TURNED)
@@ -85,21 +85,21 @@ def test_a_change_may_begin_where_the_last_one_ends():
         ([Formation(WIDE, 2.0), Formation(NARROW, 1.0, 1.0)], "planner.b.time: found 1.0"),
     ],
 )
-def test_formations_that_do_not_fit_are_refused_by_key(formations, message):
-    """The error names the formation's key, what was found and what is allowed."""
+def test_invalid_formations_are_rejected_by_key(formations, message):
+    """The error names the formation's key, the value found and the allowed values."""
     with pytest.raises(ScenarioError) as caught:
         planner(*formations)
     assert message in str(caught.value)
 
 
 def test_a_listed_formation_needs_a_block():
-    """A name without a block is missing, by its key."""
+    """The error names the key of the missing block."""
     with pytest.raises(ScenarioError, match=r"planner\.pair: found nothing"):
         FormationPlanner(PlannerSettings(formations=("pair",)), {}, Layout.scalars(2))
 
 
-def test_a_name_listed_twice_is_refused():
-    """A formation has one time, so it cannot be taken twice."""
+def test_a_name_listed_twice_is_rejected():
+    """A formation has one time, so it cannot be listed twice."""
     named = {"a": Formation(WIDE), "b": Formation(NARROW, 1.0, 1.0)}
     with pytest.raises(ScenarioError, match=r"planner\.b\.time"):
         FormationPlanner(PlannerSettings(formations=("a", "b", "b")), named, Layout.scalars(2))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Six degrees of freedom over the link: arms that carry a box, and work that turns."""
+"""Six degrees of freedom over the link: arms with a box, and work of torques."""
 
 import numpy as np
 import pytest
@@ -17,15 +17,15 @@ from noninteract_ros.subtasks.layout import Layout
 TURN = Layout((0,), (True,))
 
 
-def test_two_arms_follow_a_hand_that_moves_and_turns_and_the_account_is_kept() -> None:
-    """At 100 ms one way with jitter and losses: bound, poses and the felt wrench."""
+def test_two_arms_follow_a_hand_in_six_dimensions_within_the_energy_bound() -> None:
+    """The energy bound holds at 100 ms one way with jitter and losses, in all six coordinates."""
     rehearsal = Rehearsal(Scenario.from_dict(pose_link()))
     link = rehearsal.link
     assert link is not None
     subtask = rehearsal.stack.subtasks[0]
     values, part = rehearsal.stack.value_slices[0], rehearsal.stack.slices[0]
     assert subtask.dim == 6
-    start, felt = None, []
+    start, feedback = None, []
     for _ in range(2200):
         tick = rehearsal.step()
         if (account := link.account) is None:
@@ -35,7 +35,7 @@ def test_two_arms_follow_a_hand_that_moves_and_turns_and_the_account_is_kept() -
         assert account.operator_net >= -(0.1 + account.surprise) - 1e-9
         assert account.device_budget >= -account.surprise - 1e-9
         assert account.team_in <= account.operator_in + 0.1 + 1e-9
-        felt.append(tick.feedback[part])
+        feedback.append(tick.feedback[part])
     wanted, moved, left = (
         subtask.layout.difference(*pair)
         for pair in ((device, start), (here, start), (device, here))
@@ -44,16 +44,16 @@ def test_two_arms_follow_a_hand_that_moves_and_turns_and_the_account_is_kept() -
     assert np.linalg.norm(wanted[3:]) > 0.2
     assert np.linalg.norm(left[:3]) < 0.2 * np.linalg.norm(moved[:3])
     assert np.linalg.norm(left[3:]) < 0.2 * np.linalg.norm(moved[3:])
-    late = np.array(felt[-400:])
+    late = np.array(feedback[-400:])
     assert np.abs(late).min(axis=0).max() > 0.0
     assert np.linalg.norm(late, axis=1).max() < 100.0
-    assert (np.abs(np.array(felt)).max(axis=0) > 0.5).all()  # Forces and torques, all six.
+    assert (np.abs(np.array(feedback)).max(axis=0) > 0.5).all()  # Forces and torques, all six.
     assert link.account is not None
     assert link.account.operator_out > 0.0
 
 
-def test_without_passivity_the_arms_shake_and_energy_is_drawn() -> None:
-    """The same hand and arms."""
+def test_without_passivity_the_arms_oscillate_and_energy_is_drawn() -> None:
+    """The same hand and arms draw energy from the link."""
     rehearsal = Rehearsal(Scenario.from_dict(pose_link(passivity="none")))
     for _ in range(900):
         rehearsal.step()
@@ -62,8 +62,8 @@ def test_without_passivity_the_arms_shake_and_energy_is_drawn() -> None:
     assert rehearsal.link.account.operator_net < -1.0
 
 
-def unlike_work(period: float) -> tuple[float, float]:
-    """Work of a torque by the account and on the hand's own motion; their greatest difference."""
+def work_difference(period: float) -> tuple[float, float]:
+    """Return the work of a torque by the account, and its largest error."""
     keys = {
         "motion": "still",
         "hand_mass": 1.0,
@@ -75,7 +75,7 @@ def unlike_work(period: float) -> tuple[float, float]:
     device = HapticDevice(load(HapticSettings, keys, "haptic"), TURN)
     before = device.sample(0.0)
     assert before is not None
-    counted = apart = 0.0
+    counted = error = 0.0
     for n in range(1, round(0.4 / period) + 1):
         now = n * period
         torque = 0.1 * np.array([np.cos(20.0 * now), np.sin(20.0 * now), 0.3])
@@ -84,26 +84,26 @@ def unlike_work(period: float) -> tuple[float, float]:
         counted += float(torque @ TURN.difference(after.position, before.position))
         phi = so3.log(after.position)
         rate = so3.inverse_jacobian(phi) @ after.velocity
-        apart = max(apart, abs(counted - 0.005 * float(rate @ rate)))
+        error = max(error, abs(counted - 0.005 * float(rate @ rate)))
         before = after
-    return counted, apart
+    return counted, error
 
 
 def test_torque_and_rotation_are_power_conjugate() -> None:
-    """What the account counts is the energy of a hand that turns freely, but for the sampling.
+    """The account counts the energy of a freely rotating hand, up to the sampling error.
 
-    The axes of torque and turn change; what is left falls with the tick.
+    The axes of torque and rotation change; the error falls with the tick.
     """
-    energy, coarse = unlike_work(2e-3)
-    _, fine = unlike_work(1e-3)
+    energy, coarse = work_difference(2e-3)
+    _, fine = work_difference(1e-3)
     assert energy > 0.005
     assert coarse < 1e-4 * energy
     assert fine < 0.55 * coarse
 
 
 @pytest.mark.parametrize("scale", [0.5, 2.0])
-def test_the_scale_of_the_force_scales_what_is_felt_and_counted(scale: float) -> None:
-    """Half of the force over the same way is half of the energy, exactly."""
+def test_the_force_scale_scales_feedback_and_energy(scale: float) -> None:
+    """Half of the force over the same displacement is exactly half of the energy."""
 
     def net(force: float, **link: float) -> float:
         keys = {"motion": "circle", "centre": [0.0, 0.0], "hand_mass": 0.5}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Replay of recorded motions and the refusal of broken recordings."""
+"""Replay of recorded motions and rejection of broken recordings."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_a_cubic_motion_is_replayed_exactly():
 
 
 def test_samples_are_met_and_the_ends_held(tmp_path):
-    """A file's positions come back at its times, counted from its first; it rests outside."""
+    """The positions of a file are replayed at its times; the motion is at rest outside."""
     file = tmp_path / "hand.csv"
     file.write_text(
         "\ufefft, x, y\n2.0, 1.0, -1\n\n2.5, 1.5, -2\n3.5, 0, 3e-1\n", encoding="utf-8"
@@ -36,7 +36,7 @@ def test_samples_are_met_and_the_ends_held(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "complaint"),
+    ("text", "message"),
     [
         ("", "header is nothing, should be t and 2 coordinates"),
         ("t,x\n0,1\n1,2\n", "header is t, x, should be t and 2 coordinates"),
@@ -54,18 +54,18 @@ def test_samples_are_met_and_the_ends_held(tmp_path):
         ('t,x,y\n0,"1,2\n', "unexpected end of data"),
     ],
 )
-def test_a_broken_recording_is_refused_by_line(tmp_path, text, complaint):
-    """The message names the file, the line and what is wrong with it."""
+def test_a_broken_recording_is_rejected_by_line(tmp_path, text, message):
+    """The message names the file, the line and the error."""
     file = tmp_path / "hand.csv"
     file.write_text(text)
     with pytest.raises(InputError) as caught:
         read_recording(file, 2)
     assert str(file) in str(caught.value)
-    assert complaint in str(caught.value)
+    assert message in str(caught.value)
 
 
-def test_a_file_that_cannot_be_read_is_refused(tmp_path):
-    """A missing file, a folder and bytes that are no text are told apart from a recording."""
+def test_an_unreadable_file_is_rejected(tmp_path):
+    """A missing file, a folder and a binary file are rejected by name."""
     binary = tmp_path / "hand.bin"
     binary.write_bytes(b"t,x\n\xff\xfe\x00\n")
     for path in (tmp_path / "none.csv", tmp_path, binary):

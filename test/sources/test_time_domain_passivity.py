@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Passivity observers and controllers: no end gives away what the other has not announced."""
+"""Passivity observers and controllers: no end delivers more than the other has reported."""
 
 import numpy as np
 import pytest
@@ -17,8 +17,8 @@ PERIOD = 1e-3
 POSE = Layout((3,), (True,))
 
 
-def test_a_budget_counts_what_is_new_whatever_is_lost_late_or_repeated() -> None:
-    """Any subset of counts, in any order, brings the greatest of them and no more."""
+def test_a_budget_is_independent_of_lost_late_and_repeated_counts() -> None:
+    """Any subset of counts, in any order, adds the largest of them."""
     rng = np.random.default_rng(1)
     counts = rng.uniform(0.0, 5.0, 50)
     budget = Budget(0.25, 100.0)
@@ -27,8 +27,8 @@ def test_a_budget_counts_what_is_new_whatever_is_lost_late_or_repeated() -> None
     assert budget.level == pytest.approx(0.25 + counts.max())
 
 
-def test_a_budget_forgoes_what_is_beyond_its_capacity() -> None:
-    """Energy saved over a long time does not pile up."""
+def test_a_budget_discards_energy_above_its_capacity() -> None:
+    """Energy stored over a long time does not accumulate."""
     budget = Budget(0.0, 1.0)
     budget.receive(7.0)
     assert budget.level == 1.0
@@ -37,8 +37,8 @@ def test_a_budget_forgoes_what_is_beyond_its_capacity() -> None:
     assert budget.level == pytest.approx(0.75)
 
 
-def test_debts_are_paid_and_some_is_kept_before_anything_is_left() -> None:
-    """An overdrawn budget takes the energy first, then what it is to keep."""
+def test_saving_covers_overdraft_and_kept_energy_first() -> None:
+    """Energy first covers the overdraft, then the kept level; the rest is returned."""
     budget = Budget(0.0, 1.0)
     budget.level = -0.3
     assert budget.save(0.2, 0.05) == 0.0
@@ -47,8 +47,8 @@ def test_debts_are_paid_and_some_is_kept_before_anything_is_left() -> None:
     assert budget.save(0.2, 0.0) == 0.2
 
 
-def test_excess_is_taken_off_along_the_flow_and_nothing_else() -> None:
-    """Power ends at the limit, what is across the flow stays, and less than the limit passes."""
+def test_excess_power_is_removed_along_the_flow_only() -> None:
+    """Power is limited, the part across the flow is kept, and smaller powers pass unchanged."""
     rng = np.random.default_rng(2)
     metric = np.array([1.0, 1.0, 0.02])
     for _ in range(100):
@@ -63,19 +63,16 @@ def test_excess_is_taken_off_along_the_flow_and_nothing_else() -> None:
             assert np.linalg.matrix_rank([found - effort, metric * flow], tol=1e-9) == 1
 
 
-def test_limits_shorten_and_keep_the_direction() -> None:
-    """A force of 5 N becomes 2 N the same way; other places and shorter forces stay."""
+def test_norm_limits_keep_the_direction() -> None:
+    """5 N become 2 N in the same direction; other components and smaller forces are kept."""
     force = np.array([3.0, 4.0, 7.0])
     np.testing.assert_allclose(limit_norm(force, np.array([0, 1]), 2.0), [1.2, 1.6, 7.0])
     assert limit_norm(force, np.array([0, 1]), 5.0) is force
     assert limit_norm(force, np.array([0, 1]), 0.0) is force
 
 
-class Adversary:
-    """Both ends joined by channels, with any hand and any team: neither is passive.
-
-    The hand moves and the team pushes at random, with a bias for what draws energy.
-    """
+class RandomLink:
+    """Both ends connected by channels, with a random hand and a random team, neither passive."""
 
     def __init__(self, settings: LinkSettings, layout: Layout, seed: int) -> None:
         metric = np.ones(layout.dim)
@@ -90,7 +87,7 @@ class Adversary:
         self.least, self.overdraft = 0.0, 0.0
 
     def run(self, ticks: int) -> None:
-        """Lets both do their worst."""
+        """Run for some ticks; record the least balance and the largest overdraft."""
         dim = self._layout.dim
         velocity, feedback = np.zeros(dim), np.zeros(dim)
         for tick in range(ticks):
@@ -107,10 +104,10 @@ class Adversary:
         for packet in self._back.receive(now):
             self.device.receive(packet)
         force = self.device.force(velocity)
-        way = PERIOD * velocity
-        place = self._layout.sum(self._hand.position, way)
+        displacement = PERIOD * velocity
+        place = self._layout.sum(self._hand.position, displacement)
         self._hand = Reference(place, velocity, np.zeros_like(velocity))
-        self._there.send(now + PERIOD, self.device.observe(force, way, self._hand))
+        self._there.send(now + PERIOD, self.device.observe(force, displacement, self._hand))
         for packet in self._there.receive(now + PERIOD):
             self.team.receive(packet)
         self.team.advance(feedback)
@@ -126,33 +123,33 @@ LINKS = [
 
 @pytest.mark.parametrize("layout", [Layout.scalars(2), POSE], ids=["plane", "pose"])
 @pytest.mark.parametrize("settings", LINKS)
-def test_nobody_gets_more_out_than_was_put_in_whatever_hand_and_team_do(
+def test_energy_received_is_bounded_for_any_hand_and_team(
     settings: LinkSettings, layout: Layout
 ) -> None:
-    """Against the worst of hands and teams: the operator's account stays above -reserve.
+    """The operator's balance stays above -reserve.
 
     The hand's velocity is held over a tick here, so that the device's prediction is exact.
     """
-    adversary = Adversary(settings, layout, 7)
-    adversary.run(6000)
-    assert adversary.least >= -settings.reserve - 1e-9
-    assert adversary.overdraft <= 1e-9
-    team = adversary.team.port
-    assert team.given <= adversary.device.port.absorbed + settings.reserve + 1e-9
-    assert team.given > 0.0  # Something passed.
-    assert adversary.device.port.delivered > 0.0
+    link = RandomLink(settings, layout, 7)
+    link.run(6000)
+    assert link.least >= -settings.reserve - 1e-9
+    assert link.overdraft <= 1e-9
+    team = link.team.port
+    assert team.delivered <= link.device.port.absorbed + settings.reserve + 1e-9
+    assert team.delivered > 0.0  # Energy was exchanged.
+    assert link.device.port.delivered > 0.0
 
 
-def test_without_passivity_the_same_adversary_draws_what_it_likes() -> None:
-    """The bound above is the observers' doing."""
+def test_without_passivity_the_bound_is_broken() -> None:
+    """Without observers the same link draws more than ten times the reserve."""
     settings = LinkSettings(delay=0.2, jitter=0.3, loss=0.05, seed=2, passivity="none")
-    adversary = Adversary(settings, Layout.scalars(2), 7)
-    adversary.run(6000)
-    assert adversary.least < -10.0 * settings.reserve
+    link = RandomLink(settings, Layout.scalars(2), 7)
+    link.run(6000)
+    assert link.least < -10.0 * settings.reserve
 
 
 def test_with_a_full_budget_the_ends_change_nothing() -> None:
-    """Feedback reaches the hand as it is, and the reference goes where the hand is, at rest."""
+    """Feedback reaches the hand unchanged, and the reference converges to the hand's position."""
     layout = POSE
     settings = LinkSettings(reserve=100.0, capacity=100.0)
     start = Reference.at_rest(layout.identity, layout)
@@ -168,8 +165,8 @@ def test_with_a_full_budget_the_ends_change_nothing() -> None:
     np.testing.assert_allclose(layout.difference(reference.position, goal), 0.0, atol=1e-6)
 
 
-def test_an_overtaken_packet_brings_no_old_motion() -> None:
-    """The newest counts, not the last to arrive."""
+def test_an_overtaken_packet_is_ignored() -> None:
+    """The reference follows the newest packet, not the last one to arrive."""
     layout = Layout.scalars(1)
     team = ObservedTeam(LinkSettings(), layout, np.ones(1), PERIOD, Reference.at_rest([0.0]))
     for number, place in ((2, 0.2), (1, 0.1)):
@@ -179,8 +176,8 @@ def test_an_overtaken_packet_brings_no_old_motion() -> None:
     assert reference.position[0] == pytest.approx(0.2, abs=1e-6)
 
 
-def test_the_hand_fills_the_budget_of_the_team() -> None:
-    """While the team's end has less than its reserve the device resists, and that is announced."""
+def test_damping_at_the_hand_fills_the_budget_of_the_team() -> None:
+    """While the team's end is below its reserve the device adds damping and reports its energy."""
     settings = LinkSettings(reserve=0.2, filling=10.0, kept=0.001)
     device = ObservedDevice(settings, np.ones(1), PERIOD)
     velocity = np.array([0.5])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Wave variables: energy in waves, what a matched end feels, and who is chosen by the scenario."""
+"""Wave variables: energy of waves, matched ends, and selection by the scenario."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ RICH = LinkSettings(passivity="waves", impedance=30.0, reserve=50.0, capacity=10
 
 
 def test_power_at_the_device_is_that_of_its_waves() -> None:
-    """-f' v = (u' u - w' w) / 2 where nothing is cut off."""
+    """-f' v = (u' u - w' w) / 2 without an active limit."""
     rng = np.random.default_rng(1)
     device = WaveDevice(RICH, METRIC, PERIOD)
     for number in range(20):
@@ -40,15 +40,15 @@ def test_power_at_the_team_is_that_of_its_waves() -> None:
         team = WaveTeam(RICH, POSE, METRIC, PERIOD, start)
         wave, feedback = rng.normal(size=(2, 6))
         for number in range(300):
-            place = team._now.position  # Nothing to catch up with.
+            place = team._now.position  # No position difference.
             team.receive(Packet(number, (place, wave), 50.0, 50.0))
             velocity = team.advance(feedback).velocity
         (back,) = team.packet(feedback).signals
         assert -feedback @ velocity == pytest.approx(0.5 * (wave @ wave - back @ back), rel=1e-4)
 
 
-def test_a_matched_team_sends_nothing_back_and_the_hand_feels_the_impedance() -> None:
-    """A damper of the link's impedance at the far end is a damper in the hand, at any delay."""
+def test_a_matched_team_reflects_no_wave_and_the_feedback_is_the_impedance() -> None:
+    """A damper of the link's impedance at the team is a damper at the hand, at any delay."""
     start = Reference.at_rest(POSE.identity, POSE)
     device, team = WaveDevice(RICH, METRIC, PERIOD), WaveTeam(RICH, POSE, METRIC, PERIOD, start)
     velocity = np.array([0.2, 0.0, 0.1, 0.0, 1.0, 0.0])
@@ -60,15 +60,15 @@ def test_a_matched_team_sends_nothing_back_and_the_hand_feels_the_impedance() ->
         place = POSE.sum(place, PERIOD * velocity)
         motion = Reference(place, velocity, np.zeros(6))
         packet = device.observe(force, PERIOD * velocity, motion)
-        # The wave alone: the place that the team has.
+        # The wave alone, with the position of the team.
         team.receive(packet._replace(signals=(reference.position, packet.signals[1])))
         reference = team.advance(feedback)
     np.testing.assert_allclose(reference.velocity, velocity, atol=1e-3)
     np.testing.assert_allclose(force, -30.0 * METRIC * velocity, atol=0.02)
 
 
-def test_the_scenario_chooses() -> None:
-    """Each name that the schema allows has its ends."""
+def test_the_passivity_key_selects_the_ends() -> None:
+    """Each allowed value has its ends."""
     for name, kind in (("none", ObservedDevice), ("tdpa", ObservedDevice), ("waves", WaveDevice)):
         assert ENDS[load(LinkSettings, {"passivity": name}, "link").passivity][0] is kind
     assert len(ENDS) == 3

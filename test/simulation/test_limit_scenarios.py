@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The scenarios that provoke: what they are to show happens, is bounded, is said, and ends."""
+"""Scenarios that reach limits: the effects occur, are bounded, are reported and end."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,13 +17,13 @@ from noninteract_ros.scenario.rehearsal import Rehearsal
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 
 
-class Provoked:
-    """A scenario of the package at a lower rate, rehearsed tick by tick.
+class LimitScenario:
+    """Scenario of the package at a lower rate, rehearsed tick by tick.
 
     Attributes:
-        ticks: What the controller found at each tick.
-        wrenches: What acted on the tools, shape (ticks, N, 6).
-        told: Every set of conditions that people were told, in the order of time.
+        ticks: Result of the controller at each tick.
+        wrenches: External wrenches on the tools, shape (ticks, N, 6).
+        reported: Sets of reported conditions, in order of time.
     """
 
     def __init__(self, name: str, rate: float = 500.0, **keys: Any) -> None:
@@ -37,13 +37,13 @@ class Provoked:
         self.watch = LimitActivity(self.team.joint_names)
         self.ticks: list[Tick] = []
         self._wrenches: list[np.ndarray] = []
-        self.told: list[list[str]] = [[]]
+        self.reported: list[list[str]] = [[]]
 
     @property
     def wrenches(self) -> np.ndarray:
         return np.array(self._wrenches)
 
-    def run(self, until: float) -> "Provoked":
+    def run(self, until: float) -> "LimitScenario":
         simulation = self.rehearsal.simulation
         while simulation.now < until - 1e-9:
             now = simulation.now
@@ -51,8 +51,8 @@ class Provoked:
             self.ticks.append(self.rehearsal.step())
             self.watch.note(now, self.ticks[-1])
             conditions = self.watch.conditions(now)
-            if sorted(conditions) != sorted(self.told[-1]):
-                self.told.append(conditions)
+            if sorted(conditions) != sorted(self.reported[-1]):
+                self.reported.append(conditions)
         return self
 
     def column(self, pick: Callable[[Tick], Any]) -> np.ndarray:
@@ -68,8 +68,8 @@ def error(tick: Tick) -> np.ndarray:
 
 
 def test_singularity():
-    """The law fades out and in without a step, the arms never turn over, and they track again."""
-    found = Provoked("singularity").run(10.0)
+    """The law fades out and in without a step, the elbows never flip, and tracking resumes."""
+    found = LimitScenario("singularity").run(10.0)
     shares, elbows = found.column(lambda t: t.law_share), found.column(lambda t: t.state.q[[1, 3]])
     assert shares[0] == shares[-1] == 1.0
     assert shares.min() < 0.1
@@ -79,24 +79,24 @@ def test_singularity():
     errors = found.column(error)
     assert errors.max() > 0.2  # Beyond reach.
     assert errors[-1].max() < 1e-3
-    assert found.told == [[], ["near a singularity: recovering"], []]
+    assert found.reported == [[], ["near a singularity: recovering"], []]
 
 
 def test_joint_limits():
-    """No joint passes its limit, one is repelled, a fast one braked; then both subtasks track."""
-    found = Provoked("joint_limits").run(7.0)
+    """No joint exceeds its limit, one is repelled, a fast one is braked; then both track."""
+    found = LimitScenario("joint_limits").run(7.0)
     q, v = found.column(lambda t: t.state.q), found.column(lambda t: t.state.v)
     assert -1.9 <= q[:, 1].min() < -1.8
-    free = Provoked("joint_limits", left=_unlimited("joint_limits")).run(7.0)
+    free = LimitScenario("joint_limits", left=_unlimited("joint_limits")).run(7.0)
     assert free.column(lambda t: t.state.q[1]).min() < -2.0
     assert not any(tick.intervened for tick in free.ticks)
     fastest = np.abs(v[:, :2]).max()
     assert 1.5 < fastest < np.abs(free.column(lambda t: t.state.v[:2])).max()
     assert found.column(error)[-1].max() < 1e-3
-    said = {text for conditions in found.told for text in conditions}
-    assert "left/joint_2 at its position limit" in said
-    assert any(text.endswith("too fast") for text in said)
-    assert found.told[-1] == []
+    texts = {text for conditions in found.reported for text in conditions}
+    assert "left/joint_2 at its position limit" in texts
+    assert any(text.endswith("too fast") for text in texts)
+    assert found.reported[-1] == []
 
 
 def _unlimited(name: str) -> dict:
@@ -105,8 +105,8 @@ def _unlimited(name: str) -> dict:
 
 
 def test_effort_limits():
-    """No torque and no change of it passes its limit; the relative subtask hardly notices."""
-    found = Provoked("effort_limits").run(8.0)
+    """Torques and their rates keep their limits; the relative subtask is hardly affected."""
+    found = LimitScenario("effort_limits").run(8.0)
     torques = found.column(torque)
     assert (np.abs(torques) <= found.team.effort_limits).all()
     assert (np.abs(torques).max(axis=0) == found.team.effort_limits).any()
@@ -118,14 +118,14 @@ def test_effort_limits():
     assert errors[: 5 * 500, :2].max() > 0.03
     assert errors[: 5 * 500, 2:].max() < 0.01
     assert errors[-1].max() < 1e-3
-    said = {text for conditions in found.told for text in conditions}
-    assert said == {"at effort limits", "at the torque-rate limit"}
-    assert found.told[-1] == []
+    texts = {text for conditions in found.reported for text in conditions}
+    assert texts == {"at effort limits", "at the torque-rate limit"}
+    assert found.reported[-1] == []
 
 
 def test_wall():
-    """Both tools press with half the cooperative force, slide along, and come off again."""
-    found = Provoked("wall", law="natural").run(9.0)
+    """Both tools press with half the cooperative force, slide along the wall, and separate."""
+    found = LimitScenario("wall", law="natural").run(9.0)
     forces = -found.wrenches[:, :, 1]
     assert (forces >= 0.0).all()
     x = found.column(lambda t: t.task.x)
@@ -138,17 +138,17 @@ def test_wall():
     assert not any(tick.intervened for tick in found.ticks)
 
 
-def test_wall_without_crossing_over():
-    """The gated law presses as its closed loop says, out of one tank, and comes off again."""
-    found = Provoked("wall").run(9.0)
+def test_wall_under_the_gated_law():
+    """The gated law presses with the force of its closed loop, from one tank, and separates."""
+    found = LimitScenario("wall").run(9.0)
     wrenches = found.wrenches
     assert (wrenches[:, :, 1] <= 0.0).all()
     for k in range(4 * 500, 5 * 500, 50):
         tick = found.ticks[k]
         torque = found.rehearsal.team.external_torque(tick.state, wrenches[k])
-        resting = tick.dynamics.decoupled_external_force(torque)
-        np.testing.assert_allclose(resting[1], tick.feedback[1], rtol=0.02)
-        assert resting[1] < -10.0
+        contact = tick.dynamics.decoupled_external_force(torque)
+        np.testing.assert_allclose(contact[1], tick.feedback[1], rtol=0.02)
+        assert contact[1] < -10.0
     assert np.abs(wrenches[-500:]).max() == 0.0
     assert found.column(error)[-1].max() < 1e-3
     assert not any(tick.intervened for tick in found.ticks)
@@ -156,8 +156,8 @@ def test_wall_without_crossing_over():
 
 
 def test_carry():
-    """Three robots carry a plate: tracked to its weight's inertia, upset by a push, and back."""
-    found = Provoked("carry").run(9.0)
+    """Three robots carry a plate with small errors, are disturbed by a push, and recover."""
+    found = LimitScenario("carry").run(9.0)
     errors = found.column(error)
     before, pushed, after = slice(4 * 500, 5 * 500), slice(5 * 500, 6 * 500), slice(-500, None)
     assert errors[before, :2].max() < 0.01
@@ -175,22 +175,22 @@ def test_carry():
     assert balance.lost > 0.0
 
 
-def spread(found: Provoked) -> np.ndarray:
-    """Largest velocity of the team at each tick."""
+def spread(found: LimitScenario) -> np.ndarray:
+    """Return the largest velocity of the team at each tick."""
     return np.abs(found.column(lambda t: t.state.v)).max(axis=1)
 
 
-def door(law: str, until: float) -> Provoked:
-    """The door at rest, nobody leading, after a tiny push on one robot."""
+def door(law: str, until: float) -> LimitScenario:
+    """Run the door at rest, without an operator, after a tiny push on one robot."""
     poke = {"robot": "outer", "start": 0.01, "duration": 0.01, "force": [0.0, 1e-3, 0.0]}
     still = {"formations": ["closed"], "closed": {"value": [0.501, 0.0]}}
     keys = {"pushes": ["poke"], "poke": poke, "planner": still, "haptic__start_time": 100.0}
-    found = Provoked("door", 1000.0, law=law, **keys)
+    found = LimitScenario("door", 1000.0, law=law, **keys)
     return found.run(until)
 
 
-def test_a_passive_door_makes_noninteracting_unstable_and_natural_not():
-    """After a push of 1 mN the team at the door shakes ever more, at 15 to 25 /s, or settles."""
+def test_a_passive_door_destabilises_noninteracting_but_not_natural():
+    """After a push of 1 mN the motion grows with 15 to 25 /s, or settles."""
     v = spread(door("noninteracting", 0.6))
     t = np.arange(len(v)) / 1000.0
     envelope = np.maximum.accumulate(v)
@@ -201,9 +201,9 @@ def test_a_passive_door_makes_noninteracting_unstable_and_natural_not():
     assert v.max() < 1e-4
 
 
-def test_the_gated_law_settles_at_the_door_that_shakes_others():
-    """It spends its tank on the shaking, closes, and comes to rest; nothing is created."""
-    found = Provoked("door", 1000.0).run(6.0)
+def test_the_gated_law_settles_at_the_door():
+    """Its tank pays for the oscillation, the gate closes, and the team comes to rest."""
+    found = LimitScenario("door", 1000.0).run(6.0)
     accounts = [tick.account for tick in found.ticks]
     assert found.rehearsal.simulation.plant_q[-1] == pytest.approx(0.4, abs=1e-3)
     assert spread(found)[-1] < 1e-5
@@ -218,8 +218,8 @@ def test_the_gated_law_settles_at_the_door_that_shakes_others():
 
 
 def test_door():
-    """Opened by 0.4 rad under the natural law, the door comes to rest with its robots on it."""
-    found = Provoked("door", 1000.0, law="natural").run(6.0)
+    """Opened by 0.4 rad under the natural law, the door and its robots come to rest."""
+    found = LimitScenario("door", 1000.0, law="natural").run(6.0)
     angle = found.rehearsal.simulation.plant_q[-1]
     assert angle == pytest.approx(0.4, abs=1e-3)
     assert spread(found)[-1] < 1e-5

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Both ends of a link between a hand, a network and a team that do their worst."""
+"""Both ends of a link between an active hand, a lossy network and an active team."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -13,17 +13,17 @@ from noninteract_ros.sources.link.time_domain_passivity import ObservedDevice, O
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.reference import Reference
 
-FORCE = 20.0  # [N] of the team, at most
+FORCE = 20.0  # Largest force of the team [N].
 Moved = tuple[Array, Array]
-"""Displacement over a tick (p,) and the velocity that is measured after it (p,)."""
+"""Displacement over a tick (p,) and the velocity measured after it (p,)."""
 
 Hand = Callable[[Array], Moved]
-"""A hand: what it does in a tick under a force that it knows."""
+"""A hand: its motion in a tick under a known force."""
 
 
 @dataclass
-class Deaf:
-    """A network of bursts: for a while nothing arrives, then everything, shuffled and twice."""
+class BurstNetwork:
+    """Network of bursts: nothing arrives for a while, then everything, shuffled and twice."""
 
     rng: np.random.Generator
     longest: float = 0.4
@@ -33,12 +33,12 @@ class Deaf:
         self._until = 0.0
 
     def send(self, _now: float, packet: Packet) -> None:
-        """Keeps a packet, or loses it."""
+        """Store a packet, or lose it."""
         if self.rng.random() > 0.05:
             self._waiting.append(packet)
 
     def receive(self, now: float) -> Iterator[Packet]:
-        """All that have waited, some for good, some twice."""
+        """Deliver the stored packets, some of them never, others twice."""
         if now < self._until:
             return
         self._until = now + self.rng.uniform(0.0, self.longest) * (self.rng.random() < 0.2)
@@ -49,18 +49,18 @@ class Deaf:
             yield waiting[index]
 
 
-class Loop:
-    """A link of which neither the hand nor the team is passive.
+class AdversarialLink:
+    """Link with a hand and a team that are not passive.
 
-    The team pushes the way the hand goes, or anywhere.
+    The team pushes in the direction of the hand's motion, or in a random one.
 
     Args:
-        settings: The connection.
+        settings: Settings of the connection.
         layout: Layout of the values.
-        hand: What moves the device.
+        hand: Motion of the device.
         network: The two directions.
         period: Tick [s].
-        ends: Kinds of the device's end and of the team's.
+        ends: Classes of the device's end and of the team's end.
     """
 
     def __init__(
@@ -81,16 +81,16 @@ class Loop:
         self.device = ends[0](settings, metric, period)
         self.team = ends[1](settings, layout, metric, period, self._motion)
         self._root = np.sqrt(metric)
-        self.force = self.miss = self.debt = self.least = 0.0
+        self.force = self.error = self.overdraft = self.least = 0.0
 
-    def run(self, ticks: int) -> "Loop":
-        """Lets all do their worst; notes greatest force, miss and debt, and the least balance."""
+    def run(self, ticks: int) -> "AdversarialLink":
+        """Run; record largest force, prediction error and overdraft, and the least balance."""
         feedback = np.zeros(self._layout.dim)
         for tick in range(ticks):
             if tick % 20 == 0:
                 feedback = self._push()
             self._tick(tick * self._period, feedback)
-            self.debt = max(self.debt, -self.device.budget.level)
+            self.overdraft = max(self.overdraft, -self.device.budget.level)
             self.least = min(self.least, self.device.port.absorbed - self.device.port.delivered)
         return self
 
@@ -106,19 +106,21 @@ class Loop:
             self.device.receive(packet)
         expected = self._period * self._motion.velocity
         force = self.device.force(self._motion.velocity)
-        way, velocity = self._hand(force)
+        displacement, velocity = self._hand(force)
         self.force = max(self.force, float(np.linalg.norm(force / self._root)))
-        self.miss = max(self.miss, float(np.linalg.norm((way - expected) * self._root)))
-        place = self._layout.sum(self._motion.position, way)
+        self.error = max(self.error, float(np.linalg.norm((displacement - expected) * self._root)))
+        place = self._layout.sum(self._motion.position, displacement)
         self._motion = Reference(place, velocity, np.zeros_like(velocity))
-        self._there.send(now + self._period, self.device.observe(force, way, self._motion))
+        self._there.send(
+            now + self._period, self.device.observe(force, displacement, self._motion)
+        )
         for packet in self._there.receive(now + self._period):
             self.team.receive(packet)
         self.team.advance(feedback)
 
 
 def tremor(dim: int, frequency: float, period: float = 1e-3, amplitude: float = 5e-4) -> Hand:
-    """A hand that nearly stands still, trembling about a slow drift to and fro."""
+    """Build a hand at near rest with tremor about a slow oscillation."""
     rates = 2.0 * np.pi * frequency * (1.0 + 0.01 * np.arange(dim))
     slow = 2.0 * np.pi * 0.3
     tick = 0
@@ -137,8 +139,8 @@ def tremor(dim: int, frequency: float, period: float = 1e-3, amplitude: float = 
     return move
 
 
-def greedy(dim: int, period: float = 1e-3, acceleration: float = 50.0) -> Hand:
-    """A hand that goes the way the force of the very tick pulls, within 5 cm and 0.3 m/s."""
+def force_following(dim: int, period: float = 1e-3, acceleration: float = 50.0) -> Hand:
+    """Build a hand that follows the force of the present tick, within 5 cm and 0.3 m/s."""
     x, v = np.zeros(dim), np.zeros(dim)
 
     def move(force: Array) -> Moved:
@@ -155,8 +157,8 @@ def greedy(dim: int, period: float = 1e-3, acceleration: float = 50.0) -> Hand:
     return move
 
 
-def liar(dim: int, period: float = 1e-3, speed: float = 0.05) -> Hand:
-    """A hand that always goes with the force, behind a velocity that says the opposite."""
+def reversed_velocity(dim: int, period: float = 1e-3, speed: float = 0.05) -> Hand:
+    """Build a hand that moves with the force but reports the opposite velocity."""
     x = np.zeros(dim)
 
     def move(force: Array) -> Moved:
@@ -170,8 +172,8 @@ def liar(dim: int, period: float = 1e-3, speed: float = 0.05) -> Hand:
     return move
 
 
-def jerky(dim: int, period: float = 1e-3, seed: int = 3) -> Hand:
-    """A hand that jumps anywhere, more and more seldom farther than before."""
+def jumping(dim: int, period: float = 1e-3, seed: int = 3) -> Hand:
+    """Build a hand with random jumps and random velocities."""
     rng = np.random.default_rng(seed)
 
     def move(_force: Array) -> Moved:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Motions, hands and formations of subtasks that turn: exact derivatives, geodesics, refusals."""
+"""Motions, hands and formations with rotations: exact derivatives, geodesics, errors."""
 
 import numpy as np
 import pytest
@@ -27,23 +27,23 @@ NONE = (0.0, 0.0, 0.0, 1.0)
 
 
 def device(layout: Layout = POSE, **values) -> HapticDevice:
-    """A device as a scenario file gives it."""
+    """Build a device from keys of a scenario file."""
     return HapticDevice(load(HapticSettings, values, "haptic"), layout)
 
 
 def intended(layout: Layout = POSE, **values):
-    """Its motion over time, at any instant."""
+    """Return the intended motion of a device."""
     return device(layout, **values)._motion
 
 
 def recorded(count: int = 30):
-    """A recording of a smooth motion of a pose."""
+    """Return a recording of a smooth motion of a pose."""
     times = np.linspace(2.0, 5.0, count)
     phi = np.stack([np.sin(times), 0.5 * np.cos(2 * times), 0.3 * times], axis=1)
     return times, np.hstack([phi, -so3.exp(phi)])
 
 
-def motions_that_turn():
+def rotating_motions():
     six = {"points": [0.0, 0, 0, 1, -1, 0.5, 2, 2, 2], "times": [0.0, 1.0, 2.5]}
     swing = {"amplitude": [0.1, 0.2, 0.3], "offset": [1.0, 2.0, 3.0], "rotation": [0.7, -0.4, 1.1]}
     return {
@@ -53,7 +53,7 @@ def motions_that_turn():
             motion="circle", centre=[1.0, 2.0, 3.0], rotation=[0.5, 0.2, -0.3], orientation=Q_Z
         ),
         "waypoints": intended(motion="waypoints", orientations=NONE + Q_X + Q_Z, **six),
-        "turning only": intended(
+        "rotation only": intended(
             TURN, motion="waypoints", times=[0.0, 1.0, 2.5], orientations=NONE + Q_X + Q_Y
         ),
         "replay": replay(*recorded(), POSE),
@@ -68,11 +68,11 @@ def planner(*formations: Formation, layout: Layout = POSE):
     return FormationPlanner(PlannerSettings(formations=tuple(named)), named, layout)._motion
 
 
-@pytest.mark.parametrize("name", motions_that_turn())
+@pytest.mark.parametrize("name", rotating_motions())
 def test_derivatives_match_finite_differences(name):
-    """Velocities are those of the value, angular ones in world axes; accelerations theirs."""
-    motion = motions_that_turn()[name]
-    layout = TURN if name == "turning only" else POSE
+    """Velocities are derivatives of values, in world axes, and accelerations of velocities."""
+    motion = rotating_motions()[name]
+    layout = TURN if name == "rotation only" else POSE
     for t in np.random.default_rng(1).uniform(0.01, 2.4, 20):
         before, now, after = motion(t - STEP), motion(t), motion(t + STEP)
         velocity = layout.difference(after.position, before.position) / (2 * STEP)
@@ -83,7 +83,7 @@ def test_derivatives_match_finite_differences(name):
         assert np.linalg.norm(now.position[-4:]) == pytest.approx(1.0, abs=1e-14)
 
 
-def test_a_circle_and_a_swing_keep_their_orientation_unless_told():
+def test_the_default_rotation_is_none():
     """Without a rotation the orientation is held; without an orientation there is no turn."""
     circle = {"motion": "circle", "centre": [0.0, 0.0, 0.0]}
     for keys, expected in (({}, NONE), ({"orientation": Q_Y}, Q_Y)):
@@ -95,8 +95,8 @@ def test_a_circle_and_a_swing_keep_their_orientation_unless_told():
     assert held.velocity.shape == held.acceleration.shape == (6,)
 
 
-def test_waypoints_turn_the_shortest_way_about_one_axis():
-    """Between two orientations the motion is slerp in minimum-jerk time, whatever their signs."""
+def test_waypoints_rotate_the_shortest_way_about_one_axis():
+    """The motion is slerp in minimum-jerk time, for any signs of the quaternions."""
     keys = {"motion": "waypoints", "times": [0.0, 2.0], "points": [0.0] * 6}
     motion = intended(orientations=Q_X + tuple(-q for q in Q_Y), **keys)
     ends = Rotation.from_quat([Q_X, Q_Y])
@@ -112,7 +112,7 @@ def test_waypoints_turn_the_shortest_way_about_one_axis():
 
 
 def test_a_recording_passes_through_its_samples():
-    """Positions and orientations of every sample are met, whatever the quaternions' signs."""
+    """Positions and orientations of all samples are met, for any signs of the quaternions."""
     times, values = recorded()
     motion = replay(times, values, POSE)
     for t, value in zip(times, values, strict=True):
@@ -121,7 +121,7 @@ def test_a_recording_passes_through_its_samples():
 
 
 def test_a_recording_is_read_from_a_file(tmp_path):
-    """A CSV with quaternions is replayed; one with a quaternion that is none is refused."""
+    """A CSV with quaternions is replayed; one with an invalid quaternion is rejected."""
     file = tmp_path / "hand.csv"
     header = "t,x,y,z,qx,qy,qz,qw\n"
     file.write_text(header + "0,1,2,3,0,0,0,1\n1,1,2,3,0.6,0,0,0.8\n")
@@ -133,7 +133,7 @@ def test_a_recording_is_read_from_a_file(tmp_path):
 
 
 def test_formations_of_poses_are_reached_and_held():
-    """Each formation is its value; several elements turn at once."""
+    """Each formation is reached, with several elements rotating at once."""
     values = [(1.0, 0, 0, *Q_X, 0, 1.0, 0, *NONE), (2.0, 0, 0, *Q_Y, 0, 3.0, 0, *Q_Z)]
     motion = planner(Formation(values[0]), Formation(values[1], 1.0, 2.0), layout=TWO)
     for t, value in ((0.0, values[0]), (1.0, values[0]), (3.0, values[1]), (9.0, values[1])):
@@ -148,7 +148,7 @@ def rotating_hand(period: float = 0.001) -> RotatingHand:
 
 
 def test_a_rotating_hand_follows_its_equation_of_motion():
-    """I phi'' + d phi' + k phi = A(phi)' torque, by fine integration; places as ever."""
+    """I phi'' + d phi' + k phi = A(phi)' torque, by fine integration; translations as before."""
     hand, period = rotating_hand(), 0.001
     force = np.array([3.0, -1.0, 2.0, 1.2, -0.8, 1.5])
     hand.advance(force, 400)
@@ -166,17 +166,17 @@ def test_a_rotating_hand_follows_its_equation_of_motion():
 
 
 def test_without_force_a_rotating_hand_stays_on_the_intended_motion():
-    """The intended motion comes out, up to rounding."""
+    """The device's motion equals the intended one, up to rounding."""
     hand = rotating_hand()
     hand.advance(np.zeros(6), 50)
-    aim = motions_that_turn()["swing"](0.7)
-    device_motion = hand.deflect(aim, np.zeros(6))
-    np.testing.assert_allclose(device_motion.position, aim.position, atol=1e-15)
-    np.testing.assert_allclose(device_motion.velocity, aim.velocity, atol=1e-15)
+    wanted = rotating_motions()["swing"](0.7)
+    device_motion = hand.deflect(wanted, np.zeros(6))
+    np.testing.assert_allclose(device_motion.position, wanted.position, atol=1e-15)
+    np.testing.assert_allclose(device_motion.velocity, wanted.velocity, atol=1e-15)
 
 
-def test_a_turning_device_feels_the_torque_and_starts_anew():
-    """A device with a hand's mass gives way to the torque; after a reset to the bit again."""
+def test_torque_deflects_a_rotating_device_and_a_reset_repeats_it():
+    """A device with hand mass yields to the torque; a reset repeats this exactly."""
     keys = {"motion": "still", "centre": [0.0, 0.0, 0.0], "hand_mass": 1.0, "update_rate": 100.0}
     hand, torque = device(**keys), np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0])
     first = [hand.sample(n / 100, torque).position for n in range(20)]
@@ -202,8 +202,8 @@ SWING = {"amplitude": [1.0] * 3, "offset": [0.0] * 3}
         (POINTS | {"points": [0.0] * 12}, "haptic.points: found 12 numbers, allowed: 6 numbers"),
     ],
 )
-def test_settings_that_do_not_fit_are_refused_by_key(values, message):
-    """The error names the key, what was found and what is allowed."""
+def test_invalid_settings_are_rejected_by_key(values, message):
+    """The error names the key, the value found and the allowed values."""
     with pytest.raises(ScenarioError) as caught:
         device(**values)
     assert message in str(caught.value)
@@ -216,18 +216,18 @@ def test_settings_that_do_not_fit_are_refused_by_key(values, message):
         ((0.0,) * 7, "a quaternion has length 0, should be 1"),
     ],
 )
-def test_formations_that_are_no_poses_are_refused(value, message):
+def test_invalid_poses_of_formations_are_rejected(value, message):
     """A formation has seven numbers per element, the last four a unit quaternion."""
     with pytest.raises(ScenarioError) as caught:
         planner(Formation(value))
     assert message in str(caught.value)
 
 
-def test_a_subtask_that_only_turns_has_no_circle():
+def test_a_subtask_without_translations_has_no_circle():
     """A circle is in the plane of two coordinates."""
     with pytest.raises(ScenarioError, match=r"haptic\.motion: found circle, .* has 0"):
         device(TURN, motion="circle")
-    turned = motions.with_rotation(
+    rotation = motions.with_rotation(
         motions.still([]), motions.swing([0.1, 0.2, 0.3], 1.0, [0.0] * 3), NONE, TURN
     )
-    assert turned(0.3).position.shape == (4,)
+    assert rotation(0.3).position.shape == (4,)
