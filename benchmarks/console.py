@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from noninteract_ros.nodes.recording.subscription import RawSubscription
+from noninteract_ros.nodes.recording.raw_subscription import RawSubscription
 from playwright.sync_api import Page, sync_playwright
 from rclpy.node import Node
 

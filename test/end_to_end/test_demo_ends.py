@@ -26,8 +26,8 @@ def programs_of(process: int) -> dict[str, int]:
             command = (folder / "cmdline").read_text().split("\0")
         except OSError:  # It has ended meanwhile.
             continue
-        if parent == process and len(command) > 2:
-            found[command[2].rpartition(".")[2]] = int(folder.name)
+        if parent == process and len(command) > 3:
+            found[command[3]] = int(folder.name)  # python -m noninteract_ros.nodes NAME
     return found
 
 
