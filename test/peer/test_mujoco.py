@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""An independent plant: MuJoCo's own dynamics of two Pandas under this package's controller."""
+"""Independent plant: MuJoCo's dynamics of two Pandas under the controller of this package."""
 
 import importlib.util
 from typing import Any
@@ -19,8 +19,8 @@ from noninteract_ros.scenario.rehearsal import History, Rehearsal, rehearse
 mujoco = pytest.importorskip("mujoco", reason="MuJoCo comes with the extra [peer]")
 
 EXAMPLE = ROOT / "examples" / "mujoco_team.py"
-BOUND = 1e-6  # [rad, m] to which both plants agree, and to which subtasks are apart
-ROUNDING = 1e-11  # [rad, m] that either plant's arithmetic may add up in the times tested
+BOUND = 1e-6  # [rad, m] largest difference of the plants, and largest coupling of subtasks
+ROUNDING = 1e-11  # [rad, m] largest accumulated rounding error of either plant
 SOURCES = ("haptic_emulator", "relative_planner", "controller")
 
 
@@ -34,12 +34,12 @@ def load_example() -> Any:
 
 
 def pandas(**changes: Any) -> dict[str, Any]:
-    """The scenario of two Pandas that move freely, with changes."""
+    """Return the scenario of two freely moving Pandas with changes."""
     return merged(read_parameters(ROOT / "config" / "dual_panda_free.yaml"), changes)
 
 
 def calm() -> dict[str, Any]:
-    """The human moves the pair 0.16 m and turns it by 17 degrees within 4.4 s."""
+    """Return a scenario in which the human moves the pair by 0.16 m and 17 degrees in 4.4 s."""
     whole = pandas()["haptic"]
     points, orientations = whole["points"][:6], whole["orientations"][:8]
     way = {"times": [0.0, 4.4], "points": points, "orientations": orientations}
@@ -48,7 +48,7 @@ def calm() -> dict[str, Any]:
 
 
 class MujocoRehearsal(Rehearsal):
-    """The rehearsal of a scenario with MuJoCo in the place of the simulated team."""
+    """Rehearsal of a scenario with MuJoCo instead of the simulated team."""
 
     def __init__(self, values: dict[str, Any], substeps: int, human: bool = True) -> None:
         super().__init__(Scenario.from_dict(values), human)
@@ -71,12 +71,12 @@ def largest(difference: Array) -> float:
 
 
 def crossing(led: History, alone: History, dim: int = 6) -> Array:
-    """How far a human who leads the first subtask moves each coordinate of the others."""
+    """Return the motion of the other subtasks' coordinates due to the human."""
     return led.x[:, dim + 1 :] - alone.x[:, dim + 1 :]
 
 
 @pytest.mark.parametrize("armature", [0.0, 0.3])
-def test_both_have_the_same_dynamics(armature: float) -> None:
+def test_both_plants_have_the_same_dynamics(armature: float) -> None:
     """Inertia and bias forces of MuJoCo and Pinocchio agree to rounding at random states."""
     joints = {"armature": [armature], "friction": [2.0 * armature]}
     values = pandas(panda_1=joints, panda_2=joints)
@@ -98,8 +98,8 @@ def test_both_have_the_same_dynamics(armature: float) -> None:
         assert largest(data.qfrc_passive + team.friction * v) < 1e-10
 
 
-def test_what_parts_the_plants_is_integration_error() -> None:
-    """The same method and step agree to rounding; half the step takes 15/16 of the error away."""
+def test_the_plants_differ_by_the_integration_error() -> None:
+    """Equal methods and steps agree to rounding; half the step removes 15/16 of the error."""
     values = pandas()
     ours = rehearse(Scenario.from_dict(values), 0.7)
     same, half, quarter = (MujocoRehearsal(values, n).run(0.7).q for n in (1, 2, 4))
@@ -109,8 +109,8 @@ def test_what_parts_the_plants_is_integration_error() -> None:
     assert remaining == pytest.approx(1 / 16, rel=0.1)
 
 
-def test_what_crosses_over_is_sampling_alone() -> None:
-    """At 0.5 m/s and 1 rad/s it halves with the tick, and nothing is left as the tick vanishes."""
+def test_coupling_is_due_to_sampling_alone() -> None:
+    """At 0.5 m/s and 1 rad/s it halves with the tick and extrapolates to zero."""
     slow, fast = (
         crossing(*(MujocoRehearsal(values, 2, human).run(0.8) for human in (True, False)))
         for rate in (1000.0, 2000.0)
@@ -122,10 +122,10 @@ def test_what_crosses_over_is_sampling_alone() -> None:
     assert largest(2.0 * fast - slow) < BOUND
 
 
-def test_over_dds_mujoco_moves_as_the_rehearsal_and_subtasks_stay_apart(
+def test_mujoco_over_dds_agrees_with_the_rehearsal_and_stays_decoupled(
     ros: Ros, programs: Programs
 ) -> None:
-    """Five seconds of the real programs with MuJoCo behind the topics: both bounds hold."""
+    """Both bounds hold over five seconds of the real programs with MuJoCo as plant."""
     values = calm()
     ear = ros.ear(values)
     file = programs.write(values)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Recordings made from rehearsals, as the programs would have written them."""
+"""Recordings of rehearsals with the topics of the nodes."""
 
 from collections.abc import Callable, Mapping
 from copy import deepcopy
@@ -64,12 +64,12 @@ PAIR: dict[str, Any] = {
 }
 
 Act = Callable[[Rehearsal], Any]
-# Changes a message before it is written, or drops it: topic, time [s], arrays to arrays or None.
+# Change a message before it is written, or drop it: topic, time [s], arrays to arrays or None.
 Tamper = Callable[[str, float, list[np.ndarray]], list[np.ndarray] | None]
 
 
 def scenario_values(**changes: Any) -> dict[str, Any]:
-    """The unlike pair with keys such as `object__mass` changed; None takes a block out."""
+    """Return `PAIR` with keys such as `object__mass` changed; None removes a block."""
     values = deepcopy(PAIR)
     for name, value in nest({key.replace("__", "."): v for key, v in changes.items()}).items():
         if value is None:
@@ -89,9 +89,9 @@ def record(
     extra: Callable[[RunWriter], None] | None = None,
     acts: Mapping[float, Act] | None = None,
 ) -> Run:
-    """Rehearse a scenario for a time [s] and records all topics of the run.
+    """Rehearse a scenario for a duration [s] and record all topics of the run.
 
-    Acts are done at their times [s], as a person does who leads the team from a console.
+    Acts are called at their times [s], like the actions of a person at the console.
     """
     folder.mkdir(parents=True, exist_ok=True)
     text = yaml.safe_dump({"/**": {"ros__parameters": dict(values)}})
@@ -167,11 +167,10 @@ class _Recording:
         self._writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(message))
 
     def _add_references(self, duration: float) -> None:
-        for number, (subtask, source, sampler) in enumerate(self._sources):
+        for subtask, source, sampler in self._sources:
             announcer = Announcer(sampler, self._rate)
             announcer.reset(0.0)
             codec = next(codec for codec in self._codecs if codec.name == subtask)
-            assert number < 2
             for time, reference in announcer.announce(duration):
                 if reference is not None:
                     motion = reference.position, reference.velocity, reference.acceleration
@@ -203,7 +202,7 @@ class _Recording:
         self._add_account(now, tick, team.external_torque(tick.state, wrenches))
 
     def _add_account(self, now: int, tick: Any, external: np.ndarray) -> None:
-        """What the controller tells of the port where the team is touched."""
+        """Add the energy account of the team."""
         supplied = float(tick.error.e_rate @ tick.dynamics.force_of(external))
         self._measured += supplied * self._period / self._rate
         values = now / 1e9, *quantities(tick.account, supplied, self._measured)
@@ -211,12 +210,12 @@ class _Recording:
 
 
 def reference(codec: SubtaskCodec, time: float, position: np.ndarray) -> bytes:
-    """A serialized reference at rest."""
+    """Serialize a reference at rest."""
     return codec.encode(stamp(time), position, 0 * position, 0 * position)
 
 
 def tamper_account(change: Callable[[dict[str, float]], None]) -> Tamper:
-    """Change the account of the team that a run records, by label."""
+    """Return a tamper function that changes the recorded account of the team by label."""
 
     def tamper(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         if topic == "energy":

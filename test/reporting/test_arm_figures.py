@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Figures that only arms have, asked of the figure objects: torques, regularity, rotations."""
+"""Figures of arms: torques, regularity and rotations."""
 
 from pathlib import Path
 
@@ -36,8 +36,8 @@ def labelled(axes: Axes) -> dict[str, np.ndarray]:
     return {label: data for label, data in lines.items() if not label.startswith("_")}
 
 
-def test_torques_are_drawn_as_shares_of_their_limits(arms: Recorded) -> None:
-    """Each joint's where the telemetry speaks, and each robot's largest under its name."""
+def test_torques_are_drawn_relative_to_their_limits(arms: Recorded) -> None:
+    """Each joint has a curve at the telemetry rate; the largest of each robot has its name."""
     shares, _ = limits_figure(arms).axes
     limits = arms.team.effort_limits
     assert np.isfinite(limits).all()
@@ -57,8 +57,8 @@ def test_torques_are_drawn_as_shares_of_their_limits(arms: Recorded) -> None:
     assert shares.figure.legends
 
 
-def test_torques_without_limits_are_drawn_as_they_are(tmp_path: Path) -> None:
-    """In their own unit, to their own height."""
+def test_torques_without_limits_are_drawn_in_their_unit(tmp_path: Path) -> None:
+    """The axis scales to the largest torque."""
     values = nest(dict(read_parameters(find_scenario("planar_arms"))))
     for name in ("left", "right"):
         values[name].pop("effort_limit")
@@ -72,7 +72,7 @@ def test_torques_without_limits_are_drawn_as_they_are(tmp_path: Path) -> None:
 
 
 def test_the_smallest_singular_value_is_that_of_the_subtasks(arms: Recorded) -> None:
-    """Against (J J')'s eigenvalues at some states; time is labelled once, below."""
+    """It equals the root of the smallest eigenvalue of J J'; only the lower axis labels time."""
     shares, values = limits_figure(arms).axes
     (line,) = values.lines
     t, found = line.get_xydata().T
@@ -86,7 +86,7 @@ def test_the_smallest_singular_value_is_that_of_the_subtasks(arms: Recorded) -> 
 
 
 def test_rotations_are_drawn_as_the_angle_between_actual_and_desired(pandas: Recorded) -> None:
-    """Below the positions; against the angle of another library."""
+    """The angle below the positions agrees with SciPy's."""
     *positions, angles = tracking_figure(pandas, "cooperative").axes
     assert len(positions) == 3
     assert angles.get_ylabel() == "orientation\nerror [rad]"

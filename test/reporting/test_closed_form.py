@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The recorded subtasks against their own differential equations."""
+"""Recorded subtasks agree with their closed-form error dynamics."""
 
 from pathlib import Path
 
@@ -27,8 +27,8 @@ def deviation(folder: Path, subtask: str, **changes: object) -> float:
     return float(np.abs(found.deviation).max())
 
 
-def test_the_papers_equations_hold_and_the_deviation_halves_with_the_tick(tmp_path: Path) -> None:
-    """HoldForce the torque over a tick is of first order, in both subtasks."""
+def test_the_deviation_from_the_papers_equations_halves_with_the_tick(tmp_path: Path) -> None:
+    """The effect of the zero-order hold is of first order in both subtasks."""
     for subtask in ("cooperative", "relative"):
         coarse, fine = (
             deviation(tmp_path, subtask, rate=rate, haptic__update_rate=rate)
@@ -39,7 +39,7 @@ def test_the_papers_equations_hold_and_the_deviation_halves_with_the_tick(tmp_pa
 
 
 def test_it_is_the_papers_scalar_equation(tmp_path: Path) -> None:
-    """0.75 e'' + 25 e' + 50 e = -20 e: written out by hand, against the module's own."""
+    """The prediction solves 0.75 e'' + 25 e' + 50 e = -20 e."""
     recorded = Recorded(record(tmp_path, scenario_values(), 1.0))
     found = closed_form(recorded, "relative", [])
     np.testing.assert_allclose(found.inertia, 0.75 * np.eye(2), rtol=1e-12)
@@ -76,13 +76,13 @@ def test_it_is_the_papers_scalar_equation(tmp_path: Path) -> None:
     ],
     ids=lambda changes: next(iter(changes)),
 )
-def test_any_scenario_of_point_masses_has_one(tmp_path: Path, changes: dict) -> None:
-    """Objects, inertias, potentials, take-overs, pushes and motions are part of the equation."""
+def test_every_scenario_of_point_masses_has_a_closed_form(tmp_path: Path, changes: dict) -> None:
+    """Objects, inertias, potentials, takeovers, pushes and motions are part of the equation."""
     assert 0.0 < deviation(tmp_path, "relative", **changes) < 2e-3
 
 
-def test_another_law_of_motion_is_found_out(tmp_path: Path) -> None:
-    """Joint states of a run with 20 % more stiffness than the scenario says fail the check."""
+def test_other_dynamics_fail_the_check(tmp_path: Path) -> None:
+    """Joint states of a run with 20 % more stiffness than the scenario fail the check."""
     stiff = record(tmp_path, scenario_values(relative__stiffness=[60.0]), 1.0)
     states = iter(stiff.joints("joint_states").position)
 
@@ -94,8 +94,8 @@ def test_another_law_of_motion_is_found_out(tmp_path: Path) -> None:
     assert check.passed is False
 
 
-def test_where_it_says_nothing_it_says_why(tmp_path: Path) -> None:
-    """Other laws, foreign inputs and subtasks that nobody leads are no passes."""
+def test_an_inapplicable_closed_form_gives_the_reason(tmp_path: Path) -> None:
+    """Other laws, external inputs and subtasks without references do not pass."""
     codec = SubtaskCodec("relative", ("robot_1-robot_2",), ("x", "y"))
 
     def foreign(writer) -> None:
@@ -117,8 +117,8 @@ def test_where_it_says_nothing_it_says_why(tmp_path: Path) -> None:
         assert check.value is None
 
 
-def test_in_wall_time_a_source_speaks_when_it_likes(tmp_path: Path) -> None:
-    """Its stamps count from 1970: which instants are foreseen is not even asked."""
+def test_stamps_are_not_checked_in_wall_time(tmp_path: Path) -> None:
+    """Stamps count from 1970, so that references at any time are allowed."""
     codec = SubtaskCodec("relative", ("robot_1-robot_2",), ("x", "y"))
 
     def late(writer) -> None:
@@ -130,8 +130,8 @@ def test_in_wall_time_a_source_speaks_when_it_likes(tmp_path: Path) -> None:
     assert influences(recorded) == []
 
 
-def test_the_quintic_has_the_values_of_its_instants() -> None:
-    """Position, velocity and acceleration fit at instants, a quintic fits everywhere."""
+def test_the_quintic_fits_its_points() -> None:
+    """Position, velocity and acceleration fit at the points; a quintic fits everywhere."""
     t = np.array([0.0, 0.3, 0.35, 1.0])
     p = np.polynomial.Polynomial([1.0, -2.0, 3.0, 0.5, -1.0, 2.0])
     derivatives = [p, p.deriv(), p.deriv(2)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two Pandas in fast 6-D motion: what reaches the grasp, under each law and at each rate."""
+"""Errors of the grasp of two Pandas in fast 6-D motion, under each law and at each rate."""
 
 import io
 from pathlib import Path
@@ -23,7 +23,7 @@ from noninteract_ros.reporting.report.tables import laws_table
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.files import find_scenario, load_scenario
 
-DURATION = 2.0  # [s]; the fastest moment is at 1.8 s
+DURATION = 2.0  # [s]; the speed is largest at 1.8 s
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def at_1_khz(scenario: Scenario) -> PeakErrors:
 
 
 def test_the_grasp_stays_within_1e_5_at_1_khz(at_1_khz):
-    """At 0.5 m/s and 1 rad/s at once, with no limit of a joint in the way."""
+    """At 0.5 m/s and 1 rad/s no joint limit is active."""
     assert at_1_khz.speed == pytest.approx(0.5, rel=0.01)
     assert at_1_khz.turning == pytest.approx(1.0, rel=0.01)
     assert not at_1_khz.intervened
@@ -47,17 +47,15 @@ def test_the_grasp_stays_within_1e_5_at_1_khz(at_1_khz):
     assert at_1_khz.angle["relative"] < 1e-5
 
 
-def test_what_is_left_is_sampling_and_falls_with_the_rate(scenario, at_1_khz):
-    """Of first order in the tick: half of it at twice the rate."""
+def test_the_remaining_error_is_of_first_order_in_the_tick(scenario, at_1_khz):
+    """It halves at twice the rate."""
     fast = measure_law(scenario, "noninteracting", 2000.0, DURATION)
     assert at_1_khz.position["relative"] / fast.position["relative"] == pytest.approx(2.0, abs=0.2)
     assert at_1_khz.angle["relative"] / fast.angle["relative"] == pytest.approx(2.0, abs=0.2)
 
 
-def test_peers_with_damping_of_their_own_are_stable_and_the_grasp_shows_who_decouples(
-    scenario, at_1_khz
-):
-    """With the same stiffness: `natural` keeps references apart as well, compliance does not."""
+def test_baselines_are_stable_and_only_compliance_disturbs_the_grasp(scenario, at_1_khz):
+    """With the same stiffness `natural` decouples references as well; compliance does not."""
     natural, plain = (measure_law(scenario, law, 1000.0, 2.0) for law in (NATURAL, COMPLIANCE))
     assert max(natural.damping_per_tick, plain.damping_per_tick) < 2.0
     assert not natural.intervened
@@ -67,7 +65,7 @@ def test_peers_with_damping_of_their_own_are_stable_and_the_grasp_shows_who_deco
 
 
 def test_critical_damping_damps_every_mode_critically():
-    """Eigenvalues of the loop come in equal pairs, -w and -w, whatever inertia and stiffness."""
+    """The eigenvalues of the loop are equal pairs -w, -w for any inertia and stiffness."""
     rng = np.random.default_rng(3)
     root = rng.normal(size=(5, 5))
     inertia, stiffness = root @ root.T + 0.1 * np.eye(5), rng.uniform(1.0, 900.0, 5)
@@ -79,16 +77,16 @@ def test_critical_damping_damps_every_mode_critically():
     np.testing.assert_allclose(np.sort(rates), np.sort(2.0 * frequencies), rtol=1e-9)
 
 
-def test_the_damping_of_the_scenario_suits_its_natural_inertia_too(scenario):
-    """Which closed gates leave: well below two a tick, and no limit of a joint in the way."""
+def test_the_damping_of_the_scenario_is_stable_on_the_natural_inertia(scenario):
+    """With closed gates the damping per tick is far below two and no joint limit is active."""
     natural = measure_law(scenario, "natural", 1000.0, DURATION)
     assert natural.damping_per_tick < 0.5
     assert not natural.intervened
     assert natural.position["relative"] < 1e-5
 
 
-def test_all_laws_stand_in_one_table(tmp_path):
-    """Three rates of the scenario's law, then the others and the peers, each with its errors."""
+def test_all_laws_are_in_one_table(tmp_path):
+    """It lists three rates of the scenario's law, the other laws and the baselines."""
     scenario = Scenario.from_dict(scenario_values(object=None))
     rows = compare_laws(scenario, 0.8)
     assert [row.rate for row in rows[:3]] == [250.0, 500.0, 1000.0]
@@ -106,7 +104,7 @@ def test_all_laws_stand_in_one_table(tmp_path):
 
 
 def test_the_order_of_fall_is_that_of_the_errors():
-    """Errors that fall to a quarter at twice the rate fall with the square of the tick."""
+    """Errors that fall to a quarter at twice the rate are of second order."""
 
     def errors(law: str, rate: float, error: float, damping: float = 0.5) -> PeakErrors:
         return PeakErrors(law, rate, {"a": error}, {"a": 0.0}, 0.0, 0.0, damping, False)

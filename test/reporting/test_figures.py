@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the figures show, asked of the figure objects."""
+"""Figures show the recorded data."""
 
 from pathlib import Path
 
@@ -46,7 +46,7 @@ def curves(figure: Figure) -> list[dict[str, tuple[np.ndarray, str]]]:
 
 
 def test_the_papers_figure_2(pair: Recorded) -> None:
-    """x up and y below over time; desired dashed, actual solid, both as recorded."""
+    """x (top) and y (bottom) over time are as recorded; desired dashed, actual solid."""
     figure = tracking_figure(pair, "cooperative")
     assert labels(figure) == [("", "cooperative\nx [m]"), ("time [s]", "cooperative\ny [m]")]
     tracking = pair.tracking("cooperative")
@@ -59,14 +59,14 @@ def test_the_papers_figure_2(pair: Recorded) -> None:
 
 
 def test_the_papers_figure_3(pair: Recorded) -> None:
-    """Distances between the robots, desired and actual."""
+    """It shows desired and actual distances between the robots."""
     figure = tracking_figure(pair, "relative")
     assert labels(figure) == [("", "distance\nx [m]"), ("time [s]", "distance\ny [m]")]
     assert [sorted(found) for found in curves(figure)] == [["actual", "desired"]] * 2
 
 
 def test_the_papers_figure_4(pair: Recorded) -> None:
-    """Storage up, its rate below, each from its own subtask's start on."""
+    """It shows storage (top) and its rate (bottom) from each subtask's start on."""
     figure = storage_figure(pair)
     assert [label for _, label in labels(figure)] == ["storage [J]", "rate of storage [W]"]
     assert figure.axes[1].get_xlabel() == "time since the subtask's start [s]"
@@ -79,7 +79,7 @@ def test_the_papers_figure_4(pair: Recorded) -> None:
 
 
 def test_storage_that_does_not_settle_is_shown_to_the_end(tmp_path: Path) -> None:
-    """A push at the end of a run is in the figure; one that has decayed ends it earlier."""
+    """A late push extends the figure to the end; a decayed one ends it earlier."""
     shown = []
     for start in (0.02, 1.8):
         push = {"robot": "robot_1", "start": start, "duration": 0.1, "force": [200.0, 0.0, 0.0]}
@@ -94,7 +94,7 @@ def test_storage_that_does_not_settle_is_shown_to_the_end(tmp_path: Path) -> Non
 
 
 def test_paths_pass_through_the_tool_points(pair: Recorded) -> None:
-    """One path a robot in the plane, to scale, with formations on it."""
+    """Each robot has one path in the plane, to scale."""
     figure = paths_figure(pair)
     assert labels(figure) == [("x [m]", "y [m]")]
     assert figure.axes[0].get_aspect() == 1.0
@@ -128,8 +128,10 @@ def test_teams_on_other_axes(tmp_path: Path, axes: list[str], expected: str) -> 
     assert labels(paths_figure(recorded)) == [(expected, "z [m]")]
 
 
-def test_files_are_written_and_what_is_missing_is_named(pair: Recorded, tmp_path: Path) -> None:
-    """All figures are pictures of some size; without telemetry the reason is given."""
+def test_files_are_written_and_missing_figures_have_a_reason(
+    pair: Recorded, tmp_path: Path
+) -> None:
+    """All figures are images of some size; missing telemetry is the reason for missing ones."""
     files, missing = draw(pair, tmp_path)
     assert [file.name for file in files] == [
         "fig2_cooperative.png",

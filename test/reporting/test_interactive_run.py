@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Reports of runs that somebody led by hand: each claim is judged where it can hold."""
+"""Reports of interactive runs: each check covers the intervals in which it applies."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -33,7 +33,7 @@ STORAGE = ("storage_growth", "storage_passive", "storage_rate")
 
 
 def lead(subtask: str, *velocity: float) -> Act:
-    """Asks for a velocity, as pads, keys and target_twist do."""
+    """Send a target velocity, like pads, keys and target_twist."""
 
     def act(rehearsal: Rehearsal) -> None:
         now = rehearsal.simulation.now
@@ -48,7 +48,7 @@ def law(name: str) -> Act:
 
 
 def stiffer(rehearsal: Rehearsal) -> None:
-    """Four times the stiffness of the cooperative subtask."""
+    """Set four times the stiffness of the cooperative subtask."""
     settings = rehearsal.controller._settings[0]
     stiffness = tuple(4.0 * k for k in settings.stiffness)
     rehearsal.controller.set_impedance("cooperative", replace(settings, stiffness=stiffness))
@@ -88,7 +88,7 @@ SESSION: dict[float, Act] = {
 
 
 def values_of(scenario: str, **changes: Any) -> dict[str, Any]:
-    """A scenario as `demo --console` runs it, without anybody but the person."""
+    """Return a scenario as run by `demo --console`, without planner."""
     values = for_console(read_parameters(find_scenario(scenario)), 0)
     return {name: item for name, item in values.items() if name != "planner"} | changes
 
@@ -117,10 +117,10 @@ def session(
     return measured(tmp_path_factory.mktemp(request.param), values_of(request.param), SESSION)
 
 
-def test_a_run_that_is_led_by_hand_fails_no_claim(
+def test_an_interactive_run_fails_no_check(
     session: tuple[Recorded, dict[str, Check]],
 ) -> None:
-    """With hand-overs, a stop, other laws and gains, and a reset; where one is told, it holds."""
+    """With hand-overs, a stop, other laws and gains, and a reset, the storage checks pass."""
     _, checks = session
     assert [check for check in checks.values() if check.passed is False] == []
     for claim in ("storage_passive", "storage_rate"):
@@ -129,10 +129,10 @@ def test_a_run_that_is_led_by_hand_fails_no_claim(
     assert "law changed to natural" in checks["reproduction"].reason
 
 
-def test_what_is_judged_leaves_out_just_what_is_not_the_laws(
+def test_only_transitions_stops_and_resets_are_excluded(
     session: tuple[Recorded, dict[str, Check]],
 ) -> None:
-    """Change as long as they fade, the stop, the reset; everything else is in."""
+    """All other intervals are checked."""
     recorded, _ = session
     found = storage_balance(recorded, "cooperative")
     middle = 0.5 * (found.t[1:] + found.t[:-1])
@@ -146,21 +146,21 @@ def test_what_is_judged_leaves_out_just_what_is_not_the_laws(
     clear = np.ones(len(middle), dtype=bool)
     for first, last in [*out, (2.35, 2.35)]:
         clear &= (middle < first - near) | (middle > last + near)
-    gates = account_of_gates(recorded, middle)
+    gates = without_interventions(recorded, middle)
     assert found.in_force[clear & gates].all()
     assert (found.law[(found.t > 1.21) & (found.t < 1.49)] == "natural").all()
 
 
-def account_of_gates(recorded: Recorded, t: np.ndarray) -> np.ndarray:
-    """Whether nothing but a change or a stop took part in the torque around each time."""
+def without_interventions(recorded: Recorded, t: np.ndarray) -> np.ndarray:
+    """Return True at times without interventions within 20 ms."""
     told = recorded.energy_entry("cooperative", "interventions")
     assert told is not None
     counts = np.interp(t - 0.02, *told), np.interp(t + 0.02, *told)
     return np.asarray(counts[0] == counts[1])
 
 
-def test_each_subtask_still_follows_its_own_equation(tmp_path: Path) -> None:
-    """(29) is judged between the changes, by the motion that was asked for; gains are not told."""
+def test_each_subtask_follows_its_closed_form_between_transitions(tmp_path: Path) -> None:
+    """(29) is checked against the desired motion; changed gains are not recorded."""
     acts = {time: act for time, act in SESSION.items() if act is not stiffer}
     recorded, checks = measured(tmp_path / "sound", values_of("paper"), acts)
     for name in ("closed_form.cooperative", "closed_form.relative"):
@@ -179,15 +179,15 @@ def test_each_subtask_still_follows_its_own_equation(tmp_path: Path) -> None:
 
 
 def test_a_reset_is_no_motion(session: tuple[Recorded, dict[str, Check]]) -> None:
-    """The observer of energies does not take it for work that somebody did."""
+    """The passivity observer does not count it as external work."""
     recorded, _ = session
-    put = recorded.t[1:][~intervals.continuous_steps(recorded)]
-    np.testing.assert_allclose(put, [2.35])
+    resets = recorded.t[1:][~intervals.continuous_steps(recorded)]
+    np.testing.assert_allclose(resets, [2.35])
     assert observe(recorded).gaps == 1
 
 
-def test_who_leads_is_told(session: tuple[Recorded, dict[str, Check]]) -> None:
-    """Nobody, before the person speaks and where they let go."""
+def test_authority_is_recorded(session: tuple[Recorded, dict[str, Check]]) -> None:
+    """It is `hold` before the first input and after its timeout."""
     recorded, _ = session
     told = recorded.energy_entry("cooperative", "leader")
     assert told is not None
@@ -198,24 +198,24 @@ def test_who_leads_is_told(session: tuple[Recorded, dict[str, Check]]) -> None:
     assert recorded.start("cooperative") == pytest.approx(0.1, abs=0.005)
 
 
-def test_figures_show_who_led_and_when_the_law_was_not_alone(
+def test_figures_mark_transitions(
     session: tuple[Recorded, dict[str, Check]],
 ) -> None:
-    """A shade for the stop, each change and the new start; words for whoever leads for long."""
+    """The stop, each transition and the restart are shaded."""
     recorded, _ = session
     spans = transitions(recorded)
-    starts = [0.8, 1.5, 1.8]  # The change at 1.2 s begins where the resume has faded.
+    starts = [0.8, 1.5, 1.8]  # The transition at 1.2 s follows that of the resume.
     assert all(any(abs(first - start) < 0.02 for first, _ in spans) for start in starts)
     for figure in (tracking_figure(recorded, "relative"), storage_figure(recorded)):
         assert [len(axes.patches) for axes in figure.axes] == [len(spans)] * 2
         (legend,) = figure.legends
         assert legend.get_texts()[-1].get_text() == "stop or transition"
     assert storage_figure(recorded).axes[1].get_xlabel() == "time [s]"
-    assert account_figure(recorded).axes[2].get_legend() is not None
+    assert [len(axes.patches) for axes in account_figure(recorded).axes] == [len(spans)] * 4
 
 
-def test_a_hand_over_is_written_above_the_curves(tmp_path: Path) -> None:
-    """Dotted lines where the next one takes over, and who it is."""
+def test_figures_name_the_leading_source(tmp_path: Path) -> None:
+    """Names are above the curves at hand-overs; runs with one source have none."""
     values = values_of("paper") | {"planner": read_parameters(find_scenario("paper"))["planner"]}
     acts = {
         0.4: give("relative", "human"),
@@ -227,8 +227,8 @@ def test_a_hand_over_is_written_above_the_curves(tmp_path: Path) -> None:
     assert not list(tracking_figure(recorded, "cooperative").axes[0].texts)
 
 
-def test_energy_that_nobody_supplied_is_still_found(tmp_path: Path) -> None:
-    """After all that, storage that grows by itself fails both claims."""
+def test_unsupplied_energy_fails_after_interventions(tmp_path: Path) -> None:
+    """Storage that grows without supply at the end fails both checks."""
 
     def pumped(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         if topic == "relative/energy" and time > 2.6:
@@ -241,7 +241,7 @@ def test_energy_that_nobody_supplied_is_still_found(tmp_path: Path) -> None:
 
 
 def test_bounds_do_not_grow_with_a_reset(tmp_path: Path) -> None:
-    """What the torque does where the team is put elsewhere excuses nothing."""
+    """The torque step at a reset does not loosen the limits."""
     moves = {0.1: lead("cooperative", 0.3, 0.1)}
     limits = [
         measured(tmp_path / str(len(acts)), values_of("planar_arms"), acts)[1]
@@ -252,8 +252,8 @@ def test_bounds_do_not_grow_with_a_reset(tmp_path: Path) -> None:
         assert limits[1][name].limit < 3.0 * limits[0][name].limit
 
 
-def test_a_law_that_does_not_decouple_is_asked_for_the_balance_only(tmp_path: Path) -> None:
-    """Where it is in force all the time the claims say so; gates are none of its."""
+def test_only_the_balance_applies_to_a_coupling_law(tmp_path: Path) -> None:
+    """The other checks give the law as reason; it has no gates."""
     values = scenario_values(law="energy_gated", object=None)
     _, checks = measured(tmp_path, values, {0.0: law("natural")})
     for name in ("storage_growth.relative", "storage_passive.relative"):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A link's energy account in the report: figure and check."""
+"""Energy account of a link: figure and checks."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ KIND = "std_msgs/msg/Float64MultiArray"
 def recorded(
     folder: Path, budget: float, drawn: float = 0.5, debt_free: float = 0.309
 ) -> Recorded:
-    """A run with a link and ten accounts, a surprise of 0.01 J and falling device budgets."""
+    """Record a run with ten link accounts, a surprise of 0.01 J and falling device budgets."""
     values = scenario_values(haptic__hand_mass=0.5)
     values["link"] = {"delay": 0.1, "reserve": 0.25}
     codec = EnergyCodec(("time", *LinkAccount._fields))
@@ -38,7 +38,7 @@ def recorded(
 
 @pytest.mark.parametrize("budget", [0.7, np.inf])
 def test_the_figure_shows_ports_balance_and_budgets(tmp_path: Path, budget: float) -> None:
-    """Curves are what was published; no budget is drawn without end."""
+    """Curves are as published; infinite budgets are not drawn."""
     run = recorded(tmp_path, budget)
     account = link_account(run)
     assert account is not None
@@ -54,10 +54,8 @@ def test_the_figure_shows_ports_balance_and_budgets(tmp_path: Path, budget: floa
 
 
 @pytest.mark.parametrize(("drawn", "kept"), [(0.5, True), (2.0288, True), (2.0290, False)])
-def test_a_link_that_gives_more_than_its_bound_fails_the_report(
-    tmp_path: Path, drawn: float, kept: bool
-) -> None:
-    """9 times (2 - drawn) J is the least balance; reserve and surprise are 0.26 J."""
+def test_energy_drawn_beyond_the_bound_fails(tmp_path: Path, drawn: float, kept: bool) -> None:
+    """The smallest balance is 9 (2 - drawn) J; reserve and surprise are 0.26 J."""
     metrics, (check, debt) = link_metrics(recorded(tmp_path, 0.5, drawn))
     assert check.passed is kept
     assert debt.passed
@@ -67,16 +65,16 @@ def test_a_link_that_gives_more_than_its_bound_fails_the_report(
 
 
 @pytest.mark.parametrize(("first", "kept"), [(-0.0009, True), (-0.0011, False)])
-def test_a_device_that_owes_more_than_single_ticks_explain_fails_the_report(
+def test_a_device_budget_below_the_overdraft_of_single_ticks_fails(
     tmp_path: Path, first: float, kept: bool
 ) -> None:
-    """Its budget falls 9 mJ from the first account on; ticks explain 10 mJ."""
+    """The budget falls by 9 mJ from the first account on; the overdraft is 10 mJ."""
     _, (_, debt) = link_metrics(recorded(tmp_path, 0.5, debt_free=first))
     assert debt.passed is kept
 
 
-def test_it_is_drawn_where_there_is_a_link_and_only_there(tmp_path: Path) -> None:
-    """`link.png` is among the files of such a run."""
+def test_the_figure_is_drawn_only_for_runs_with_a_link(tmp_path: Path) -> None:
+    """`link.png` is among the files only with a link."""
     for name, run in (
         ("with", recorded(tmp_path, 0.5)),
         ("without", Recorded(record(tmp_path, scenario_values(), 0.2))),

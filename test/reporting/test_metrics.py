@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Each check passes on a sound run and fails on one that is broken in its respect."""
+"""Each check passes on a sound run and fails on a run that violates it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -35,12 +35,12 @@ def checks(found: Findings) -> dict[str, Check]:
 
 
 def test_a_sound_run_passes_everything(tmp_path: Path) -> None:
-    """Nothing is missing, the nodes add nothing, subtasks do not move each other."""
+    """No tick is missing, nodes reproduce the rehearsal, subtasks are decoupled."""
     found = findings(tmp_path)
     failed = [check for check in found.checks if check.passed is False]
     assert not failed
-    unsaid = {check.name for check in found.checks if check.passed is None}
-    assert unsaid == {
+    inapplicable = {check.name for check in found.checks if check.passed is None}
+    assert inapplicable == {
         "storage_growth.cooperative",
         "storage_growth.relative",
         "recorder_lost",
@@ -52,7 +52,7 @@ def test_a_sound_run_passes_everything(tmp_path: Path) -> None:
 
 
 def test_tracking_is_measured_from_the_first_reference_on(tmp_path: Path) -> None:
-    """The error before the human starts does not count; that of the first reference does."""
+    """The error before the first reference does not count."""
     tracking = findings(tmp_path).metrics["tracking"]
     assert tracking["cooperative"]["led_from_s"] == 0.5
     expected = np.hypot(2 * np.sin(0.79 * 0.5), 1.0)
@@ -104,14 +104,14 @@ def pumped(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray
         (pumped, ["storage_rate.relative", "storage_passive.relative"]),
     ],
 )
-def test_what_is_broken_fails_its_check(tmp_path: Path, tamper: Tamper, names: list[str]) -> None:
-    """Lost messages, moved states and invented energy are each found by name."""
+def test_a_violation_fails_its_check(tmp_path: Path, tamper: Tamper, names: list[str]) -> None:
+    """Lost messages, changed states and generated energy fail the checks of their name."""
     found = checks(findings(tmp_path, tamper))
     assert [name for name in names if found[name].passed is not False] == []
 
 
 def test_storage_without_disturbance_never_grows(tmp_path: Path) -> None:
-    """Without object and with still references the check applies, holds, and can fail."""
+    """Without object and with references at rest the check applies, passes, and can fail."""
     quiet = {"object": None, "haptic__motion": "still", "haptic__centre": [0.5, 0.2]}
     sound = checks(findings(tmp_path, **quiet))
     assert sound["storage_growth.relative"].passed
@@ -126,15 +126,15 @@ def test_storage_without_disturbance_never_grows(tmp_path: Path) -> None:
     assert broken["storage_growth.relative"].passed is False
 
 
-def test_the_natural_law_lets_errors_cross_over(tmp_path: Path) -> None:
-    """The comparison shows it; claims that are not the natural law's do not apply to it."""
+def test_the_natural_law_couples_errors(tmp_path: Path) -> None:
+    """The comparison shows it; checks of decoupling do not apply."""
     run = record(tmp_path, scenario_values(law="natural"), 1.2)
     found = measure(Recorded(run))
     by_name = checks(found)
     for name in ("noninteraction.human", "closed_form.relative", "storage_growth.relative"):
         assert by_name[name].passed is None
         assert "natural" in by_name[name].reason
-    # What passes through a subtask is bounded by what any of them stores.
+    # The energy exchanged is bounded by the largest storage of all subtasks.
     limits = [by_name[f"storage_rate.{name}"].limit for name in ("cooperative", "relative")]
     peaks = [
         found.metrics["energy"][name]["storage_max_J"] for name in ("cooperative", "relative")
@@ -147,8 +147,8 @@ def test_the_natural_law_lets_errors_cross_over(tmp_path: Path) -> None:
     assert moved["noninteracting"]["human"]["relative"]["m"] < 1e-12
 
 
-def test_what_came_from_outside_is_named(tmp_path: Path) -> None:
-    """A push takes the claims away that no longer hold; they do not count as passed."""
+def test_external_influences_are_named(tmp_path: Path) -> None:
+    """Checks that a push invalidates do not apply; they do not count as passed."""
 
     def push(writer: RunWriter) -> None:
         data = serialize_message(to_wrench_stamped(0, np.zeros(6)))
@@ -161,8 +161,8 @@ def test_what_came_from_outside_is_named(tmp_path: Path) -> None:
         assert "robot_1/push" in checks(found)[name].reason
 
 
-def test_the_other_source_may_say_what_it_likes(tmp_path: Path) -> None:
-    """A target from outside for one subtask leaves the claim about the other in force."""
+def test_inputs_of_one_subtask_leave_checks_of_the_other(tmp_path: Path) -> None:
+    """An external input of one subtask does not affect the checks of the other."""
 
     def target(writer: RunWriter) -> None:
         data = serialize_message(to_wrench_stamped(0, np.zeros(6)))
@@ -177,7 +177,7 @@ def test_the_other_source_may_say_what_it_likes(tmp_path: Path) -> None:
 
 
 def again(change: float) -> Callable[[RunWriter], None]:
-    """Says one of autonomy's references a second time, late, with another position or the same."""
+    """Publish a reference of autonomy again, late, with its position changed."""
     codec = SubtaskCodec("relative", ("robot_1-robot_2",), ("x", "y"), False)
     position = np.array([1.0 + change, 1.0])
 
@@ -188,8 +188,8 @@ def again(change: float) -> Callable[[RunWriter], None]:
     return say
 
 
-def test_a_reference_that_is_said_again_changes_nothing(tmp_path: Path) -> None:
-    """As a source does that saw a state twice: the same bytes for the same instant."""
+def test_a_repeated_reference_is_no_conflict(tmp_path: Path) -> None:
+    """A source repeats its reference when it receives a state twice: same bytes, same stamp."""
     run = record(tmp_path, scenario_values(), 1.2, extra=again(0.0))
     topic = "relative/autonomy/reference"
     assert len(run.log_times(topic)) == len(run.trajectory(topic).stamps) + 1
@@ -200,8 +200,8 @@ def test_a_reference_that_is_said_again_changes_nothing(tmp_path: Path) -> None:
         assert by_name[name].passed
 
 
-def test_two_references_for_one_instant_are_another_thing(tmp_path: Path) -> None:
-    """Nobody knows which of them led the team: no claim that needs to know is judged."""
+def test_conflicting_references_invalidate_checks(tmp_path: Path) -> None:
+    """The reference in force is unknown: checks that depend on it do not apply."""
     run = record(tmp_path, scenario_values(), 1.2, extra=again(1e-9))
     found = checks(measure(Recorded(run), other_laws=False))
     for name in ("closed_form.relative", "reproduction", "noninteraction.human"):
@@ -209,8 +209,8 @@ def test_two_references_for_one_instant_are_another_thing(tmp_path: Path) -> Non
         assert "conflicting references with equal stamps" in found[name].reason
 
 
-def test_in_wall_time_only_what_holds_there_is_claimed(tmp_path: Path) -> None:
-    """Every run is another one then: nothing about single ticks passes or fails."""
+def test_checks_of_single_ticks_do_not_apply_in_wall_time(tmp_path: Path) -> None:
+    """Runs are not reproducible: nothing about single ticks passes or fails."""
     found = findings(tmp_path, lose, lockstep=False)
     by_name = checks(found)
     storage = [f"storage_{claim}.relative" for claim in ("growth", "passive", "rate")]
@@ -235,7 +235,7 @@ def test_in_wall_time_only_what_holds_there_is_claimed(tmp_path: Path) -> None:
 def test_changes_at_run_time_are_named(
     tmp_path: Path, message: str, values: dict[str, object], text: str
 ) -> None:
-    """What the controller says of itself shows that a run left its scenario."""
+    """Controller diagnostics show that a run left its scenario."""
 
     def tell(writer: RunWriter) -> None:
         said = to_diagnostics(1, [to_status("/team/controller", Level.OK, message, values)])
@@ -247,7 +247,7 @@ def test_changes_at_run_time_are_named(
 
 
 def test_diagnostics_are_summed_up(tmp_path: Path) -> None:
-    """The worst level, the last one, refusals, and what the recorder lost, which fails."""
+    """They contain worst and last level and rejected inputs; lost messages fail their check."""
 
     def tell(writer: RunWriter) -> None:
         said = [
@@ -275,8 +275,8 @@ def test_diagnostics_are_summed_up(tmp_path: Path) -> None:
     assert checks(found)["recorder_lost"].passed is False
 
 
-def test_a_recording_that_cannot_be_analysed_says_why(tmp_path: Path) -> None:
-    """No scenario, a wrong scenario, no joint states: one line each."""
+def test_a_recording_that_cannot_be_analysed_gives_the_reason(tmp_path: Path) -> None:
+    """A missing or invalid scenario is named in one line."""
     for text, reason in [
         (None, "no scenario"),
         ("/**: {ros__parameters: {robots: [a]}}", "invalid scenario: .*required"),
@@ -292,6 +292,6 @@ def test_a_recording_that_cannot_be_analysed_says_why(tmp_path: Path) -> None:
 
 
 def test_rehearsals_last_until_a_source_has_taken_over() -> None:
-    """Where the human leads from a planned hand-over on, what they move shows only then."""
+    """The human's effect appears only after the planned hand-over."""
     scenario = load_scenario(find_scenario("hand_over"))
     assert source_starts(scenario) == {"human": 2.5, "autonomy": 0.0}

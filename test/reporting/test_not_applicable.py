@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Runs on which something else than the law was at work: claims that do not hold are not made."""
+"""Checks of the law do not apply to runs with joint limits, friction or contact."""
 
 from pathlib import Path
 from typing import Any
@@ -40,8 +40,8 @@ def checks(folder: Path, **changes: Any) -> dict[str, Check]:
     ],
     ids=["effort limits", "friction", "wall"],
 )
-def test_claims_of_the_law_alone_do_not_apply(tmp_path, changes, reason, names):
-    """Each has its reason, and nothing that still has to hold fails."""
+def test_checks_of_the_law_do_not_apply(tmp_path, changes, reason, names):
+    """Each has its reason, and no remaining check fails."""
     found = checks(tmp_path, **changes)
     for name in names:
         assert found[name].passed is None
@@ -49,8 +49,8 @@ def test_claims_of_the_law_alone_do_not_apply(tmp_path, changes, reason, names):
     assert [check for check in found.values() if check.passed is False] == []
 
 
-def test_without_any_of_it_they_do(tmp_path):
-    """The same run with generous limits confirms all of them."""
+def test_they_apply_with_inactive_limits(tmp_path):
+    """The same run with generous limits passes all of them."""
     generous = {"robot_1__effort_limit": [1e4], "robot_2__effort_limit": [1e4]}
     found = checks(tmp_path, **generous)
     for name in ("closed_form.relative", "noninteraction.human", "storage_passive.relative"):

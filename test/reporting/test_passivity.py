@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The observer that trusts nobody: against the simulation's own balance, and against accounts."""
+"""Passivity observer, compared with the simulation's balance and with the account."""
 
 from pathlib import Path
 from typing import Any
@@ -23,7 +23,7 @@ DURATION = 1.0
 
 
 def arms_values(**changes: Any) -> dict[str, Any]:
-    """Planar arms that stand upright in gravity, with friction, led, and pushed at an elbow."""
+    """Return upright planar arms in gravity, with friction, references and a push at an elbow."""
     values = nest(dict(read_parameters(find_scenario("planar_arms"))))
     for name in ("left", "right"):
         values[name] |= {"plane": "xz", "friction": [0.3]}
@@ -40,7 +40,7 @@ def arms(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 
 
 def balances(scenario: Scenario, ticks: int) -> np.ndarray:
-    """Works of controls, pushes and losses until each state, shape (ticks, 3) [J]."""
+    """Return works of controls, pushes and losses until each state, shape (ticks, 3) [J]."""
     rehearsal = Rehearsal(scenario)
     rows = []
     for _ in range(ticks):
@@ -50,8 +50,8 @@ def balances(scenario: Scenario, ticks: int) -> np.ndarray:
     return np.array(rows)
 
 
-def test_what_was_received_is_the_work_of_pushes_less_friction(arms: Recorded) -> None:
-    """As the plant integrated it; the elbow's push and the joints' friction no sensor knows."""
+def test_received_energy_is_the_work_of_pushes_less_friction(arms: Recorded) -> None:
+    """It agrees with the integration of the plant, though sensors measure neither."""
     seen = observe(arms)
     controls, pushes, lost = balances(arms.scenario, len(arms.t)).T
     received = pushes - lost
@@ -63,8 +63,8 @@ def test_what_was_received_is_the_work_of_pushes_less_friction(arms: Recorded) -
     assert seen.altered == 0.0
 
 
-def test_no_part_of_it_is_taken_from_the_law_or_a_sensor(arms: Recorded, tmp_path: Path) -> None:
-    """With nothing recorded but joint states and commands the energies are the same."""
+def test_joint_states_and_commands_suffice(arms: Recorded, tmp_path: Path) -> None:
+    """Without other topics the energies are the same."""
 
     def bare(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
         return arrays if topic.startswith("joint") else None
@@ -73,11 +73,11 @@ def test_no_part_of_it_is_taken_from_the_law_or_a_sensor(arms: Recorded, tmp_pat
     expected = observe(arms)
     np.testing.assert_array_equal(seen.received, expected.received)
     np.testing.assert_array_equal(seen.put_in, expected.put_in)
-    assert np.isnan(seen.along[-1])  # Nobody knows the references.
+    assert np.isnan(seen.along[-1])  # References are unknown.
 
 
-def test_lost_states_are_left_out_and_named(arms: Recorded, tmp_path: Path) -> None:
-    """What happened in gaps is in no sum; everything else is."""
+def test_gaps_are_excluded_and_counted(arms: Recorded, tmp_path: Path) -> None:
+    """Sums contain all energies except those of the gaps."""
 
     def lossy(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
         lost = 0.4005 < time < 0.4505 or abs(time - 0.7) < 1e-6
@@ -92,10 +92,8 @@ def test_lost_states_are_left_out_and_named(arms: Recorded, tmp_path: Path) -> N
     assert abs(skipped) > 1e-6
 
 
-def test_in_wall_time_only_the_robots_know_which_torque_acted(
-    arms: Recorded, tmp_path: Path
-) -> None:
-    """Commands that answer a state act later there; the efforts of the next states count."""
+def test_measured_efforts_count_in_wall_time(arms: Recorded, tmp_path: Path) -> None:
+    """Commands act late; the efforts of the next states are used."""
 
     def liar(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         return [2.0 * arrays[0]] if topic == "joint_commands" else arrays
@@ -106,8 +104,8 @@ def test_in_wall_time_only_the_robots_know_which_torque_acted(
     np.testing.assert_array_equal(seen.received, observe(arms).received)
 
 
-def test_in_lockstep_a_command_that_was_not_applied_shows(tmp_path: Path) -> None:
-    """What the commands would have put in is not what the motion shows."""
+def test_a_command_that_was_not_applied_shows_in_lockstep(tmp_path: Path) -> None:
+    """The difference of command and effort is reported."""
 
     def liar(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         return [arrays[0] + 1.0] if topic == "joint_commands" else arrays
@@ -116,8 +114,8 @@ def test_in_lockstep_a_command_that_was_not_applied_shows(tmp_path: Path) -> Non
     assert seen.altered == pytest.approx(1.0, abs=1e-9)
 
 
-def test_point_masses_and_arms_are_counted_alike(tmp_path: Path) -> None:
-    """On constant inertias no state is evaluated; the result is that of the general way."""
+def test_constant_inertias_give_the_general_result(tmp_path: Path) -> None:
+    """The shortcut for constant inertias agrees with the general computation."""
     quick = Recorded(record(tmp_path, scenario_values(), 0.6))
     slow = Recorded(quick.run)
     slow.__dict__["constant"] = False
@@ -128,16 +126,16 @@ def test_point_masses_and_arms_are_counted_alike(tmp_path: Path) -> None:
         )
 
 
-def test_the_controllers_account_says_the_same(arms: Recorded) -> None:
-    """Though the push at the elbow, friction and moving references are all in it."""
+def test_the_controllers_account_agrees(arms: Recorded) -> None:
+    """It agrees with a push at the elbow, friction and moving references."""
     metrics, (check,) = passivity_metrics(arms)
     assert check.passed is True
     received = external_work(observe(arms))[1]
     assert metrics["account"]["disagreement_J"] < 1e-3 * np.abs(received).max()
 
 
-def test_both_accounts_come_together_as_the_tick_shrinks(tmp_path: Path) -> None:
-    """What parts them is sampling, of second order."""
+def test_the_accounts_converge_with_the_tick(tmp_path: Path) -> None:
+    """Their difference is due to sampling."""
     apart = []
     for rate in (500.0, 1000.0):
         values = arms_values(rate=rate)
@@ -147,8 +145,8 @@ def test_both_accounts_come_together_as_the_tick_shrinks(tmp_path: Path) -> None
     assert apart[0] > 1.7 * apart[1]
 
 
-def test_an_account_that_begins_anew_is_compared_piece_by_piece(tmp_path: Path) -> None:
-    """Its sums start at zero again; nothing is wrong with that."""
+def test_an_account_with_a_reset_is_compared_by_segments(tmp_path: Path) -> None:
+    """Sums that restart at zero pass."""
     run = Recorded(record(tmp_path / "true", arms_values(), DURATION))
     column = team_account(run).received
     base = float(column[120])
@@ -164,8 +162,8 @@ def test_an_account_that_begins_anew_is_compared_piece_by_piece(tmp_path: Path) 
     assert check.passed is True
 
 
-def test_an_account_that_takes_no_notice_of_an_elbow_fails(tmp_path: Path) -> None:
-    """One that claims to have received nothing hides what the push brought."""
+def test_an_account_without_received_energy_fails(tmp_path: Path) -> None:
+    """It hides the work of the push."""
 
     def nothing(columns: dict[str, float]) -> None:
         columns["received"] = 0.0
@@ -177,8 +175,8 @@ def test_an_account_that_takes_no_notice_of_an_elbow_fails(tmp_path: Path) -> No
     assert metrics["account"]["disagreement_J"] == pytest.approx(np.abs(received).max(), rel=0.01)
 
 
-def test_without_an_account_there_is_nothing_to_compare(tmp_path: Path) -> None:
-    """The observer's own numbers are there all the same."""
+def test_without_an_account_the_check_does_not_apply(tmp_path: Path) -> None:
+    """The energies of the observer are reported."""
 
     def silent(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
         return None if topic == "energy" else arrays
@@ -190,8 +188,8 @@ def test_without_an_account_there_is_nothing_to_compare(tmp_path: Path) -> None:
     assert metrics["received_J"] == pytest.approx(observe(run).received[-1])
 
 
-def test_references_that_jump_at_a_tick_are_known_from_its_telemetry(tmp_path: Path) -> None:
-    """In contact, led over a link that jitters: the account agrees to rounding."""
+def test_jumping_references_agree_to_rounding(tmp_path: Path) -> None:
+    """The account agrees in contact over a link with jitter."""
     run = record(tmp_path, read_parameters(find_scenario("delayed_wall")), 1.5)
     metrics, (check,) = passivity_metrics(Recorded(run))
     assert abs(metrics["along_references_J"]) > 0.1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `RunWriter` writes, as the readers of other people see it."""
+"""Files of `RunWriter` are readable by other MCAP readers."""
 
 import os
 import subprocess
@@ -101,7 +101,7 @@ def test_a_killed_writer_loses_less_than_two_chunks(tmp_path: Path) -> None:
 
 
 def test_flush_saves_a_chunk_that_is_not_full(tmp_path: Path) -> None:
-    """What was added before `flush` is in the file even if the writer never goes on."""
+    """Messages before `flush` are in the file without `close`."""
     path = tmp_path / "run.mcap"
     with RunWriter(path, None) as writer:
         writer.add("/a", JOINT_STATE, 0, 0, joint_state(0))
@@ -109,8 +109,8 @@ def test_flush_saves_a_chunk_that_is_not_full(tmp_path: Path) -> None:
         assert repair(path, tmp_path / "copy.mcap").messages == 1
 
 
-def test_an_existing_file_is_kept_unless_told(tmp_path: Path) -> None:
-    """A run is never written over by accident."""
+def test_an_existing_file_is_kept_by_default(tmp_path: Path) -> None:
+    """Overwriting a run must be requested."""
     path = tmp_path / "run.mcap"
     path.write_bytes(b"precious")
     with pytest.raises(RecordingError, match="exists"):
@@ -120,8 +120,8 @@ def test_an_existing_file_is_kept_unless_told(tmp_path: Path) -> None:
     assert Run.open(path).topics == {}
 
 
-def test_a_full_disk_is_reported_and_what_was_written_is_kept(tmp_path: Path) -> None:
-    """Without room the writer raises one error that names the file; the rest can be repaired."""
+def test_a_full_disk_is_reported_and_the_file_can_be_repaired(tmp_path: Path) -> None:
+    """The writer raises one error that names the file."""
     path = tmp_path / "run.mcap"
     result = subprocess.run(
         [sys.executable, "-c", FULL_DISK_WRITER, str(path)],
@@ -134,15 +134,15 @@ def test_a_full_disk_is_reported_and_what_was_written_is_kept(tmp_path: Path) ->
     assert repair(path).messages > 500
 
 
-def test_an_unwritable_path_is_refused(tmp_path: Path) -> None:
+def test_an_unwritable_path_is_rejected(tmp_path: Path) -> None:
     """A folder that is a file gives a typed error."""
     (tmp_path / "file").touch()
     with pytest.raises(RecordingError, match="cannot be written"):
         RunWriter(tmp_path / "file" / "run.mcap", None)
 
 
-def test_a_type_without_definition_is_refused_by_name(tmp_path: Path) -> None:
-    """An unknown type is named, and the file goes on."""
+def test_a_type_without_definition_is_rejected_by_name(tmp_path: Path) -> None:
+    """The error names the type, and recording continues."""
     with RunWriter(tmp_path / "run.mcap", None) as writer:
         with pytest.raises(RecordingError, match="sensor_msgs/msg/Nothing"):
             writer.add("/a", "sensor_msgs/msg/Nothing", 0, 0, b"")

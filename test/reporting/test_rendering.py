@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of the motion: shapes where the robots are, bodies where they rest, ghosts on goals."""
+"""Rendering of robots, held bodies and reference ghosts."""
 
 from pathlib import Path
 
@@ -87,8 +87,8 @@ def test_collision_geometry_moves_with_the_joints(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.ptp(parts[0].points, axis=0), [0.2, 0.4, 0.6], atol=1e-12)
 
 
-def test_what_is_held_is_drawn_where_the_simulation_had_it(carried: Recorded) -> None:
-    """The recording lacks the plate; where it rests in its grips is nearly where it was."""
+def test_held_bodies_are_drawn_near_their_simulated_pose(carried: Recorded) -> None:
+    """The static equilibrium in the grasps is close to the simulated pose."""
     rehearsal = Rehearsal(carried.scenario)
     scene = Scene(carried)
     for row in range(400):
@@ -98,7 +98,7 @@ def test_what_is_held_is_drawn_where_the_simulation_had_it(carried: Recorded) ->
             plates = [
                 next(h for owner, h in scene.hulls(q) if owner == NO_ROBOT) for q in (drawn, true)
             ]
-            # It sets out without strain, above where it rests by m g / 3 k, which is 2.18 mm.
+            # It starts without strain, m g / 3 k = 2.18 mm above its rest.
             assert np.abs(plates[0].points - plates[1].points).max() < 2.2e-3
             np.testing.assert_allclose(
                 np.linalg.norm(np.ptp(plates[0].points, axis=0)[:2]), np.hypot(0.6, 0.4), rtol=0.05
@@ -107,7 +107,7 @@ def test_what_is_held_is_drawn_where_the_simulation_had_it(carried: Recorded) ->
 
 
 def test_the_ghost_is_on_the_references(carried: Recorded) -> None:
-    """All subtasks of the ghost have their desired values, which the team has not when pushed."""
+    """All subtasks of the ghost have their desired values; those of the pushed team do not."""
     scene = Scene(carried)
     row = 200
     ghost = scene.snapshot(row).ghost
@@ -125,7 +125,7 @@ def test_the_ghost_is_on_the_references(carried: Recorded) -> None:
 
 
 def test_a_push_is_an_arrow_while_it_lasts(carried: Recorded) -> None:
-    """It ends at the elbow that is pushed, only between 0.2 s and 0.5 s."""
+    """It ends at the pushed elbow, from 0.2 s to 0.5 s only."""
     animation = Animation(carried)
     counts = []
     for row in (50, 150, 350):
@@ -145,8 +145,8 @@ def test_a_push_is_an_arrow_while_it_lasts(carried: Recorded) -> None:
     np.testing.assert_array_equal(force, [15.0, 0.0, 0.0])
 
 
-def test_the_film_strip_shows_six_moments(carried: Recorded) -> None:
-    """From the first to the last, with all of the team inside each picture."""
+def test_the_image_sequence_shows_six_states(carried: Recorded) -> None:
+    """They range from the first to the last, with the whole team inside each image."""
     animation = Animation(carried)
     figure = motion_figure(animation)
     assert len(figure.axes) == 6
@@ -162,7 +162,7 @@ def test_the_film_strip_shows_six_moments(carried: Recorded) -> None:
 
 
 def test_the_animation_is_short_and_small(tmp_path: Path, carried: Recorded) -> None:
-    """A GIF in real time whose pictures differ."""
+    """It is a GIF in real time with differing images."""
     path = save_animation(Animation(carried), tmp_path / "motion.gif")
     assert path.stat().st_size < 2_000_000
     with Image.open(path) as animation:
@@ -175,8 +175,8 @@ def test_the_animation_is_short_and_small(tmp_path: Path, carried: Recorded) -> 
     assert np.abs(shown[0] - shown[1]).max() > 50
 
 
-def test_point_masses_are_balls_with_lines_between(tmp_path: Path) -> None:
-    """Heavier ones are larger; a team that moves in a plane is seen from above."""
+def test_point_masses_are_spheres_joined_by_edges(tmp_path: Path) -> None:
+    """Heavier spheres are larger; a planar team is viewed from above."""
     animation = Animation(Recorded(record(tmp_path, scenario_values(), 0.3)))
     light, heavy = (hull for _, hull in animation.scene.hulls(animation.scene.snapshot(0).q))
     sizes = [np.ptp(hull.points, axis=0).max() for hull in (light, heavy)]
@@ -186,8 +186,8 @@ def test_point_masses_are_balls_with_lines_between(tmp_path: Path) -> None:
     assert animation.scene.edges == [(0, 1)]
 
 
-def test_states_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
-    """The rest is drawn."""
+def test_non_finite_states_are_skipped(tmp_path: Path) -> None:
+    """All other states are drawn."""
 
     def spoil(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         broken = topic == "joint_states" and time < 0.1
@@ -198,8 +198,8 @@ def test_states_that_are_no_numbers_are_left_out(tmp_path: Path) -> None:
     assert len(motion_figure(animation).axes) == 6
 
 
-def test_hulls_are_closed_and_look_outward() -> None:
-    """Whatever the shape: the divergence theorem gives its volume, refined or not."""
+def test_hulls_are_closed_with_outward_normals() -> None:
+    """The divergence theorem gives the volume of every shape, refined or not."""
     turned = pin.SE3(pin.utils.rotate("x", 0.7), np.array([0.3, -0.2, 1.0]))
     for hull, volume in (
         (hulls.box(np.array([0.2, 0.4, 0.6])), 0.048),
@@ -223,8 +223,8 @@ def test_edges_of_a_box_stay_sharp() -> None:
     np.testing.assert_allclose(np.sort(np.abs(normals), axis=1), [[0, 0, 1]] * 36, atol=1e-12)
 
 
-def test_what_is_near_hides_what_is_far() -> None:
-    """Whatever the order in which they are given."""
+def test_near_bodies_hide_far_ones() -> None:
+    """The result does not depend on the order of the bodies."""
     camera = Camera.towards(np.zeros(3), 1.0, -90.0, 0.0)
     near = "#FF0000", hulls.sphere(0.2).transformed(pin.SE3(np.eye(3), np.array([0.0, -1.0, 0.0])))
     far = "#0000FF", hulls.sphere(0.6)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Repair keeps what can be kept, wherever the file was cut."""
+"""Repair keeps all complete messages of truncated and damaged files."""
 
 from io import BytesIO
 from pathlib import Path
@@ -32,13 +32,13 @@ def recording(tmp_path: Path) -> Path:
 
 
 def numbers(path: Path) -> list[int]:
-    """The numbers of the messages in a file, read by the plain MCAP reader."""
+    """Return the sequence numbers of a file, read by the standard MCAP reader."""
     with path.open("rb") as stream:
         return [message.sequence for _, _, message in make_reader(stream).iter_messages()]
 
 
 def test_a_cut_anywhere_keeps_the_chunks_before_it(recording: Path, tmp_path: Path) -> None:
-    """For each length of the file, the result is whole, in order, and as long as it can be."""
+    """For each length of the file the result is complete, in order, and of maximal length."""
     whole = recording.read_bytes()
     rng = np.random.default_rng(6)
     kept = []
@@ -58,14 +58,14 @@ def test_a_cut_anywhere_keeps_the_chunks_before_it(recording: Path, tmp_path: Pa
 
 
 def test_the_scenario_survives_a_cut(recording: Path) -> None:
-    """It stands before all messages, so that even a run without any keeps it."""
+    """It is stored before all messages."""
     recording.write_bytes(recording.read_bytes()[:400])
     assert repair(recording.parent).messages == 0
     assert Run.open(recording).scenario == "rate: 1000.0"
 
 
-def test_a_whole_file_is_left_alone(recording: Path, tmp_path: Path) -> None:
-    """Nothing is rewritten where nothing is wrong; a copy is made where one is asked for."""
+def test_an_intact_file_is_unchanged(recording: Path, tmp_path: Path) -> None:
+    """A copy is written only if requested."""
     before = recording.read_bytes()
     report = repair(recording)
     assert report.intact
@@ -76,7 +76,7 @@ def test_a_whole_file_is_left_alone(recording: Path, tmp_path: Path) -> None:
 
 
 def test_damage_in_the_middle_costs_one_chunk(recording: Path) -> None:
-    """A chunk whose check sum fails is left out, and the rest is kept."""
+    """A chunk with a wrong checksum is skipped, and all others are kept."""
     data = bytearray(recording.read_bytes())
     at = data.index(b"zstd", data.index(b"zstd") + 4)
     data[at + 30] ^= 0xFF
@@ -90,7 +90,7 @@ def test_damage_in_the_middle_costs_one_chunk(recording: Path) -> None:
 
 
 def test_a_damaged_scenario_costs_no_message(recording: Path) -> None:
-    """A scenario whose check sum fails is left out and said, never passed on altered."""
+    """A scenario with a wrong checksum is skipped and reported."""
     data = recording.read_bytes().replace(b"rate: 1000.0", b"rate: 9000.0", 1)
     recording.write_bytes(data)
     report = repair(recording)
@@ -100,7 +100,7 @@ def test_a_damaged_scenario_costs_no_message(recording: Path) -> None:
 
 
 def test_a_tail_of_zeros_is_cut(recording: Path) -> None:
-    """A file that a crashed system left with a gap ends at the gap."""
+    """A file with a gap after a system crash is truncated at the gap."""
     data = recording.read_bytes()
     recording.write_bytes(data[: len(data) // 2] + bytes(5000))
     report = repair(recording)
@@ -109,7 +109,7 @@ def test_a_tail_of_zeros_is_cut(recording: Path) -> None:
 
 
 def test_foreign_content_is_kept(tmp_path: Path) -> None:
-    """Metadata, attachments and the channels' own metadata of another writer stay."""
+    """Metadata, attachments and channel metadata of another writer are kept."""
     stream = BytesIO()
     writer = Writer(stream, use_chunking=False)
     writer.start("other", "other")
@@ -132,8 +132,8 @@ def test_foreign_content_is_kept(tmp_path: Path) -> None:
     assert (message.log_time, message.publish_time, message.sequence) == (1, 2, 3)
 
 
-def test_what_is_no_recording_is_refused_and_untouched(tmp_path: Path) -> None:
-    """Missing, empty and foreign files are refused, and nothing is left behind."""
+def test_files_that_are_no_recordings_are_rejected_unchanged(tmp_path: Path) -> None:
+    """Missing, empty and foreign files raise errors, and no other file remains."""
     path = tmp_path / "run.mcap"
     with pytest.raises(RecordingError, match="no such file"):
         repair(path)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The report of a run, from its recording alone."""
+"""Report of a run from its recording."""
 
 import json
 from pathlib import Path
@@ -24,7 +24,7 @@ def shown(report) -> str:
 
 
 def test_a_report_holds_metrics_checks_and_figures(tmp_path: Path) -> None:
-    """Everything lands in the folder asked for, and the file says what the report says."""
+    """All files are in the requested folder, and `metrics.json` agrees with the report."""
     record(tmp_path, scenario_values(), 1.2)
     report = write_report(tmp_path, tmp_path / "out")
     assert report.passed
@@ -44,8 +44,8 @@ def test_a_report_holds_metrics_checks_and_figures(tmp_path: Path) -> None:
         assert word in text
 
 
-def test_a_report_is_the_same_each_time(tmp_path: Path) -> None:
-    """By default it lies beside the recording, and two of the same run are equal."""
+def test_a_report_is_reproducible(tmp_path: Path) -> None:
+    """Two reports of a run in its own folder are equal."""
     run = record(tmp_path, scenario_values(), 0.6)
     texts = []
     for _ in range(2):
@@ -55,7 +55,7 @@ def test_a_report_is_the_same_each_time(tmp_path: Path) -> None:
 
 
 def test_a_broken_run_does_not_pass(tmp_path: Path) -> None:
-    """The failures are listed, and numbers that are none are null."""
+    """Failed checks are listed, and non-finite numbers are null."""
 
     def spoil(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray]:
         if topic == "joint_states" and time == 0.2:
@@ -74,7 +74,7 @@ def test_a_broken_run_does_not_pass(tmp_path: Path) -> None:
     assert "failed:[/] complete.numbers_not_finite, reproduction" in summary(report)
 
 
-def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
+def test_a_missing_recording_is_rejected(tmp_path: Path) -> None:
     """The error names the file."""
     with pytest.raises(RecordingError, match=r"run\.mcap"):
         write_report(tmp_path)
@@ -90,14 +90,14 @@ def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
         ("no scenario", "no scenario: the run cannot be analysed"),
     ],
 )
-def test_what_cannot_be_read_is_one_sentence_and_exit_status_2(
+def test_an_unreadable_recording_gives_one_line_and_exit_status_2(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     content: bytes | str | None,
     said: str,
 ) -> None:
-    """A person at a terminal learns what is wrong with which file, and no more."""
+    """The line names the file and the error."""
     file = tmp_path / "run.mcap"
     if isinstance(content, bytes):
         file.write_bytes(content)
@@ -113,8 +113,8 @@ def test_what_cannot_be_read_is_one_sentence_and_exit_status_2(
     assert said in line
 
 
-def test_errors_stand_in_their_own_units(tmp_path: Path) -> None:
-    """Joints that turn and joints that slide, in the tables and in the file."""
+def test_errors_have_their_own_units(tmp_path: Path) -> None:
+    """Revolute and prismatic joints have separate rows in tables and in the file."""
     joints = ["arm/joint_1", "arm/joint_2", "mass/x", "mass/y"]
     values = {
         "robots": ["arm", "mass"],

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What `Run` reads back, against what was serialized by ROS."""
+"""`Run` reads messages as serialized by ROS."""
 
 from pathlib import Path
 from typing import Any
@@ -24,7 +24,7 @@ def type_name(message: Any) -> str:
 
 
 def record(folder: Path, *messages: tuple[str, Any]) -> Run:
-    """Record messages; the n-th is sent at n seconds and received half a second later."""
+    """Record messages; message n is sent at n seconds and received half a second later."""
     with RunWriter(folder / "run.mcap", "rate: 1000.0") as writer:
         for number, (topic, message) in enumerate(messages):
             sent = number * 10**9
@@ -76,7 +76,7 @@ def labelled(labels: list[str], data: list[float]) -> Float64MultiArray:
 
 
 def test_joint_states_come_back_exactly(tmp_path: Path) -> None:
-    """Stamps, names and all numbers are those that were sent, at any length of names."""
+    """Stamps, names and all numbers are as sent, for all lengths of names."""
     rng = np.random.default_rng(1)
     for length in range(1, 9):
         names = ["a" * length, "b"]
@@ -103,7 +103,7 @@ def test_joint_states_come_back_exactly(tmp_path: Path) -> None:
 
 
 def test_missing_fields_and_names_are_nan(tmp_path: Path) -> None:
-    """Each name that occurs has one column; what a message lacks or missizes is NaN there."""
+    """Each name has one column, NaN where a message lacks it or has a wrong size."""
     found = record(
         tmp_path,
         ("/c", joints(1.0, ["a", "b"], effort=[1.0, 2.0])),
@@ -118,7 +118,7 @@ def test_missing_fields_and_names_are_nan(tmp_path: Path) -> None:
 
 
 def test_of_equal_stamps_the_first_message_counts(tmp_path: Path) -> None:
-    """A state that was re-sent appears once."""
+    """A repeated state appears once."""
     found = record(
         tmp_path,
         *(("/s", joints(t, ["a"], position=[p])) for t, p in [(1, 1.0), (1, 9.0), (2, 2.0)]),
@@ -128,7 +128,7 @@ def test_of_equal_stamps_the_first_message_counts(tmp_path: Path) -> None:
 
 
 def test_trajectories_come_back_exactly(tmp_path: Path) -> None:
-    """Poses, twists and accelerations of each element are those that were sent."""
+    """Poses, twists and accelerations of each element are as sent."""
     rng = np.random.default_rng(2)
     values = rng.standard_normal((6, 3, 19))
     names = ["robot_1-robot_2", "x", "yy"]
@@ -169,7 +169,7 @@ def test_markers_are_kept_apart(tmp_path: Path) -> None:
 
 
 def test_wrenches_come_back_exactly(tmp_path: Path) -> None:
-    """Force, torque and frame are those that were sent."""
+    """Force, torque and frame are as sent."""
     values = np.random.default_rng(3).standard_normal((4, 6))
     sent = []
     for k, row in enumerate(values):
@@ -184,7 +184,7 @@ def test_wrenches_come_back_exactly(tmp_path: Path) -> None:
 
 
 def test_labelled_numbers_are_found_by_label(tmp_path: Path) -> None:
-    """The entry `time` is the stamp, wherever it stands; without it the time of sending is."""
+    """The entry `time` is the stamp at any position; otherwise the time of publication."""
     run = record(
         tmp_path,
         ("/e", labelled(["storage", "time", "tank"], [1.0, 0.125, 2.0])),
@@ -238,7 +238,7 @@ def test_fast_decoding_agrees_with_the_general_decoder(tmp_path: Path) -> None:
 
 
 def test_scenario_topics_and_times(tmp_path: Path) -> None:
-    """A run knows its scenario, its topics' types, and when messages were sent and received."""
+    """A run has scenario, topic types, and times of publication and reception."""
     run = record(tmp_path, ("/a", joints(0, ["a"])), ("/a", joints(1, ["a"])))
     assert run.scenario == "rate: 1000.0"
     assert run.topics == {"/a": "sensor_msgs/msg/JointState"}
@@ -247,7 +247,7 @@ def test_scenario_topics_and_times(tmp_path: Path) -> None:
 
 
 def test_the_teams_topics_come_before_those_of_its_robots(tmp_path: Path) -> None:
-    """A name without its namespace means the topic nearest to the root, where there is one."""
+    """A name without namespace selects the topic nearest to the root."""
     topics = ("/team/left/joint_states", "/team/joint_states", "/team/right/joint_states")
     run = record(tmp_path, *((topic, joints(0, [topic[6]])) for topic in topics))
     assert list(run.joints("joint_states").names) == ["j"]
@@ -255,7 +255,7 @@ def test_the_teams_topics_come_before_those_of_its_robots(tmp_path: Path) -> Non
 
 
 def test_wrong_topics_are_named_with_the_right_ones(tmp_path: Path) -> None:
-    """Missing, ambiguous and mistyped topics each give an error that says what there is."""
+    """Missing, ambiguous and mistyped topics raise errors that list the alternatives."""
     run = record(tmp_path, *((topic, joints(0, ["a"])) for topic in ("/x/state", "/y/state")))
     with pytest.raises(RecordingError, match=r"/z is not in the recording.*/x/state \| /y/state"):
         run.joints("/z")
@@ -269,14 +269,14 @@ def test_wrong_topics_are_named_with_the_right_ones(tmp_path: Path) -> None:
     "data", [b"", b"\0\1\0\0", b"\0\0\0\0" + bytes(40), b"\0\1" + b"\xff" * 60]
 )
 def test_a_malformed_message_is_named(tmp_path: Path, data: bytes) -> None:
-    """Bytes that are no message of their type give an error, never wrong numbers."""
+    """Invalid bytes raise an error that names the message."""
     run = record(tmp_path, ("/a", joints(0, ["a"])), ("/a", data))
     with pytest.raises(RecordingError, match="/a: message 1"):
         run.joints("/a")
 
 
-def test_what_is_no_recording_is_refused(tmp_path: Path) -> None:
-    """Missing, empty, foreign and unfinished files each say what is wrong."""
+def test_invalid_files_are_rejected(tmp_path: Path) -> None:
+    """Missing, empty, foreign and truncated files raise errors with the reason."""
     record(tmp_path, ("/a", joints(0, ["a"])))
     whole = (tmp_path / "run.mcap").read_bytes()
     path = tmp_path / "other.mcap"

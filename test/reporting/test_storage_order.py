@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Storage against supply at several rates: what is missed falls as holding the torque says."""
+"""Order of convergence of the storage balances with the control rate."""
 
 from dataclasses import replace
 
@@ -21,8 +21,8 @@ def arms() -> Scenario:
     return replace(scenario, general=replace(scenario.general, rate=250.0))
 
 
-def test_residuals_fall_in_first_order_and_in_second_once_holding_is_counted(arms):
-    """On two unlike arms that somebody struck, with energies a thousand times what is missed."""
+def test_residuals_are_of_first_order_and_of_second_with_the_hold_work(arms):
+    """On two unequal arms with initial velocity, residuals are small against the storage."""
     metrics, checks = storage_orders(arms, 0.4)
     for name in ("cooperative", "relative"):
         found = metrics[name]
@@ -36,8 +36,8 @@ def test_residuals_fall_in_first_order_and_in_second_once_holding_is_counted(arm
     assert table.row_count == 4
 
 
-def test_energy_from_nowhere_does_not_fall_with_the_tick(arms, monkeypatch):
-    """A law that pushes with a constant torque of its own is found out."""
+def test_generated_energy_does_not_converge(arms, monkeypatch):
+    """A law with an additional constant torque fails."""
 
     class Cheating(Rehearsal):
         def command(self, tick: Tick) -> np.ndarray:
@@ -49,8 +49,8 @@ def test_energy_from_nowhere_does_not_fall_with_the_tick(arms, monkeypatch):
         assert storage_order.convergence_order(rows, name, explained=True) < 0.3
 
 
-def test_where_nobody_knows_the_supply_it_says_so(arms):
-    """People who push elbows are felt by no tool."""
+def test_an_unknown_supply_gives_the_reason(arms):
+    """Pushes at elbows are not measured at the tools."""
     pushed = load_scenario(find_scenario("carry"))
     metrics, checks = storage_orders(pushed, 0.1)
     assert "not on a tool" in metrics["reason"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The account of the port where a team is touched: metrics, checks and the fifth figure."""
+"""Energy account of the team's external port: metrics, checks and figure."""
 
 from pathlib import Path
 from typing import Any
@@ -28,8 +28,8 @@ def passed(checks: list[Any]) -> dict[str, bool | None]:
     return {check.name.removeprefix("account."): check.passed for check in checks}
 
 
-def test_an_experiment_that_nobody_touches_keeps_both_gates_open(pair: Recorded) -> None:
-    """The metrics are those of the columns."""
+def test_gates_stay_open_without_external_force(pair: Recorded) -> None:
+    """Metrics agree with the columns of the account."""
     metrics, checks = account_metrics(pair)
     assert passed(checks) == {"residual": True, "sigma": True, "nu": True}
     found = team_account(pair)
@@ -42,8 +42,8 @@ def test_an_experiment_that_nobody_touches_keeps_both_gates_open(pair: Recorded)
     assert metrics["accounts"] == 1
 
 
-def test_a_gate_that_closes_is_found_and_timed(tmp_path: Path) -> None:
-    """A tenth of a second at sigma 0.4, in a run where it has no reason to."""
+def test_a_closed_gate_fails_and_is_timed(tmp_path: Path) -> None:
+    """Sigma is 0.4 for 0.1 s without external force."""
 
     def closed(columns: dict[str, float]) -> None:
         if 0.2999 < columns["time"] < 0.3999:
@@ -57,8 +57,8 @@ def test_a_gate_that_closes_is_found_and_timed(tmp_path: Path) -> None:
     assert metrics["sigma_below_1_s"] == pytest.approx(0.1, abs=1e-9)
 
 
-def test_energy_from_nowhere_is_no_rounding(tmp_path: Path) -> None:
-    """A microjoule of residual fails, and so does one that is no number."""
+def test_generated_energy_fails(tmp_path: Path) -> None:
+    """A residual of 1 uJ fails, and so does NaN."""
     for wrong in (1e-6, np.nan):
 
         def more(columns: dict[str, float], wrong: float = wrong) -> None:
@@ -69,16 +69,16 @@ def test_energy_from_nowhere_is_no_rounding(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("law", ["natural", "noninteracting"])
-def test_other_laws_have_no_gates_but_an_account(tmp_path: Path, law: str) -> None:
-    """It is kept as an observer."""
+def test_laws_without_gates_have_an_account(tmp_path: Path, law: str) -> None:
+    """Checks of gates do not apply."""
     metrics, checks = account_metrics(Recorded(record(tmp_path, scenario_values(law=law), 0.3)))
     assert passed(checks) == {"residual": True, "sigma": None, "nu": None}
     assert metrics["sigma_min"] is None
     assert metrics["gated_s"] == 0.0
 
 
-def test_what_the_team_touches_may_close_a_gate(tmp_path: Path) -> None:
-    """Then there is nothing to claim."""
+def test_contact_may_close_a_gate(tmp_path: Path) -> None:
+    """Checks of gates do not apply to runs with pushes."""
     push = {"robot": "robot_1", "start": 0.1, "duration": 0.1, "force": [9.0, 0.0, 0.0]}
     run = Recorded(record(tmp_path, gated() | {"pushes": ["shove"], "shove": push}, 0.3))
     _, checks = account_metrics(run)
@@ -87,7 +87,7 @@ def test_what_the_team_touches_may_close_a_gate(tmp_path: Path) -> None:
 
 
 def test_without_an_account_the_reason_is_given(tmp_path: Path) -> None:
-    """Old recordings are read all the same."""
+    """Recordings without account are readable."""
 
     def silent(topic: str, time: float, arrays: list[np.ndarray]) -> list[np.ndarray] | None:
         return None if topic == "energy" else arrays
@@ -100,8 +100,8 @@ def test_without_an_account_the_reason_is_given(tmp_path: Path) -> None:
         account_figure(run)
 
 
-def test_the_fifth_figure_shows_all_of_the_account(pair: Recorded) -> None:
-    """Energies, powers, gates and sums over time, each as recorded."""
+def test_the_figure_shows_the_whole_account(pair: Recorded) -> None:
+    """Energies, powers, gates and sums are as recorded."""
     figure = account_figure(pair)
     found = team_account(pair)
     expected = [

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Unlike planar arms: what holding the torque over a tick does, and what it does not excuse."""
+"""Effect of the zero-order hold of the torque on unequal planar arms."""
 
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ DURATION = 1.2
 
 
 def arms(folder: Path, rate: float = 1000.0, **changes: Any) -> Recorded:
-    """The scenario planar_arms, led from the start and stopped early."""
+    """Record a short run of planar_arms, led from the start."""
     values = read_parameters(find_scenario("planar_arms")) | {"rate": rate} | changes
     for arm in ("left", "right"):
         values[arm] |= {"velocity_limit": [30.0], "effort_limit": [1000.0]}
@@ -29,20 +29,20 @@ def arms(folder: Path, rate: float = 1000.0, **changes: Any) -> Recorded:
 
 
 def checks_of(recorded: Recorded) -> dict[str, Check]:
-    """All checks of a run by name, those of other laws left out."""
+    """Return the checks of a run by name, without other laws."""
     return {check.name: check for check in measure(recorded, other_laws=False).checks}
 
 
 def test_moving_arms_pass_every_check(tmp_path):
-    """Motions cross over, and storage grows, by no more than holding the torque explains."""
+    """Coupling and storage growth stay within the effect of the zero-order hold."""
     checks = checks_of(arms(tmp_path))
     assert [check.name for check in checks.values() if check.passed is False] == []
     for name in ("noninteraction.human", "storage_growth.relative", "storage_rate.cooperative"):
         assert checks[name].passed
 
 
-def test_what_holding_explains_falls_with_the_tick(tmp_path):
-    """Half the tick: half the motion that crosses over, half its bound."""
+def test_the_effect_of_the_hold_is_of_first_order(tmp_path):
+    """Coupling and its limit halve with the tick."""
     coarse, fine = (
         checks_of(arms(tmp_path / str(rate), rate))["noninteraction.human"]
         for rate in (500.0, 1000.0)
@@ -53,15 +53,15 @@ def test_what_holding_explains_falls_with_the_tick(tmp_path):
     assert fine.limit < 5.0 * fine.value
 
 
-def test_the_balance_of_energy_closes_with_the_work_of_holding(tmp_path):
-    """Without it (33) misses forty times as much, on arms that start on their references."""
+def test_the_energy_balance_closes_with_the_hold_work(tmp_path):
+    """The residual of (33) is forty times smaller than the hold work."""
     recorded = arms(tmp_path)
     with_work, _ = energy_metrics(recorded, "cooperative", recorded_hold_force(recorded))
     assert with_work["rate_mismatch_J"] < with_work["hold_work_J"] / 40.0
 
 
-def test_a_law_that_makes_energy_is_not_excused(tmp_path):
-    """With C_s,ii, as the paper has it, storage grows where nothing supplies it."""
+def test_a_law_that_generates_energy_fails(tmp_path):
+    """With the paper's C_s,ii storage grows without supply."""
     loose = {"stiffness": [40.0], "damping": [0.3], "takeover": "direct", "authority": "human"}
     changes = {
         "cooperative": loose | {"kind": "cooperative_position"},
@@ -78,8 +78,8 @@ def test_a_law_that_makes_energy_is_not_excused(tmp_path):
     assert failed == {"paper": True, "noninteracting": False}
 
 
-def test_a_force_on_a_damper_alone_leads_further_the_longer_it_lasts():
-    """Springs bound a deflection, and so does a short time."""
+def test_the_deflection_of_a_damper_grows_with_the_duration():
+    """Springs and short durations bound the deflection."""
     gains = Impedance(np.array([10.0, 0.0]), np.array([5.0, 5.0]), np.full(2, np.inf), (None,))
     force = np.array([[1.0, 1.0], [-2.0, 0.5]])
     assert deflection(gains, force, 100.0) == pytest.approx([0.4, 40.0])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`noninteract bench` on tiny settings: that it measures what it says, not how fast it is."""
+"""`noninteract bench` with tiny settings: completeness of the results, not their speed."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ def own_domain(monkeypatch: pytest.MonkeyPatch, domain: int) -> None:
 
 
 def run(monkeypatch: pytest.MonkeyPatch, folder: Path, *arguments: str) -> dict[str, Any]:
-    """What the command writes as JSON."""
+    """Run the command and return its JSON."""
     file = folder / "bench.json"
     monkeypatch.setattr("sys.argv", ["noninteract", "bench", "--json", str(file), *arguments])
     assert cli.main() == 0
@@ -40,7 +40,7 @@ def rows_of(figures: dict[str, Any]) -> dict[str, dict[str, Any]]:
 def test_law_and_node_are_timed_for_every_scenario(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Each scenario has its law and its controller node, each beside Pinocchio's own terms."""
+    """Each scenario has rows of law and controller node with Pinocchio's terms as floor."""
     parts = ("--part", "law", "--part", "node")
     figures = run(monkeypatch, tmp_path, *parts, "--ticks", "12")
     rows = rows_of(figures)
@@ -54,10 +54,10 @@ def test_law_and_node_are_timed_for_every_scenario(
     assert "floor" in capsys.readouterr().out
 
 
-def test_the_real_programs_are_timed_beside_a_bare_round_trip(
+def test_programs_are_timed_with_their_baselines(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """Lockstep has a row without and one with the recorder, wall time one beside bare sleeping."""
+    """Lockstep is timed with and without recorder, wall time against plain sleep."""
     parts = ("--part", "lockstep", "--part", "wall")
     rows = rows_of(run(monkeypatch, tmp_path, *parts, "--rounds", "1", "--seconds", "0.5"))
     assert rows["lockstep tick, paper"]["floor"] == "raw round trip of two processes"
@@ -66,20 +66,20 @@ def test_the_real_programs_are_timed_beside_a_bare_round_trip(
     assert jitter["floor"] == "absolute sleep alone, period error"
 
 
-def test_an_unknown_part_is_refused(
+def test_an_unknown_part_is_rejected(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Status 2, and the parts there are."""
+    """The exit status is 2 and the message lists the parts."""
     monkeypatch.setattr("sys.argv", ["noninteract", "bench", "--part", "lawn"])
     assert cli.main() == 2
     assert "law | node | lockstep | wall" in capsys.readouterr().err
 
 
-def test_things_take_turns() -> None:
-    """Two things are timed in alternating batches, after a warm-up, each run prepared once."""
+def test_tasks_alternate() -> None:
+    """Two tasks are timed in alternating batches after a warm-up; each run is prepared once."""
     calls: list[str] = []
 
-    class Noted:
+    class RecordedTask:
         def __init__(self, name: str) -> None:
             self.name = name
 
@@ -89,7 +89,7 @@ def test_things_take_turns() -> None:
         def run(self) -> None:
             calls.append(self.name)
 
-    times = time_alternately({name: Noted(name) for name in "ab"}, 2 * bench.BATCH)
+    times = time_alternately({name: RecordedTask(name) for name in "ab"}, 2 * bench.BATCH)
     assert [len(found) for found in times.values()] == [2 * bench.BATCH] * 2
     runs = [call for call in calls if len(call) == 1]
     assert calls[::2] == [f"prepare {name}" for name in runs]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`noninteract check`: facts of a scenario, modes of its loops, and laws that are broken."""
+"""`noninteract check`: facts, sampled loops and identities of a scenario."""
 
 import json
 from collections.abc import Callable
@@ -31,7 +31,7 @@ FEW = CheckSettings(samples=3)
 
 
 def arms_probe() -> LawProbe:
-    """Two unlike planar arms, whose Coriolis terms do not vanish."""
+    """Return two unequal planar arms with Coriolis terms."""
     team = Team(PlanarArms().robots())
     gains = np.full(team.n, 10.0), np.full(team.n, 5.0), np.full(team.n, np.inf)
     return LawProbe(team, SubtaskStack(team, mixed_subtasks(2)), Impedance(*gains, (None, None)))
@@ -42,7 +42,7 @@ def failed(probe: LawProbe) -> set[str]:
 
 
 def scenario_file(folder: Path, **changes: object) -> str:
-    """The paper's scenario with other values, keys of blocks as `block__key`."""
+    """Write the paper's scenario with changed values, keys of blocks as `block__key`."""
     values = read_parameters(PAPER)
     for name, value in changes.items():
         block, _, key = name.partition("__")
@@ -72,7 +72,7 @@ def test_the_papers_team_passes_with_the_papers_numbers() -> None:
     assert loop["damping ratios"] == pytest.approx([25.0 / 2.0 / np.sqrt(50.0 * 0.75)] * 2)
 
 
-def test_the_law_holds_on_unlike_arms() -> None:
+def test_the_law_holds_on_unequal_arms() -> None:
     """Every identity holds where Coriolis terms and Jacobian rates do not vanish."""
     assert failed(arms_probe()) == set()
 
@@ -114,27 +114,27 @@ def test_the_law_holds_on_unlike_arms() -> None:
         ),
     ],
 )
-def test_a_broken_law_is_found_out(
+def test_a_broken_law_fails_its_identities(
     monkeypatch: pytest.MonkeyPatch,
     module: object,
     name: str,
     broken: Callable[..., object],
     found: set[str],
 ) -> None:
-    """Each piece of the law, once broken, fails the identities that rest on it, and no other."""
+    """Each broken part of the law fails exactly the identities that depend on it."""
     monkeypatch.setattr(module, name, broken)
     assert failed(arms_probe()) == found
 
 
 def test_not_a_number_fails() -> None:
-    """A law that returns NaN fails instead of slipping through a comparison."""
+    """A law that returns NaN fails."""
     probe = arms_probe()
     probe.impedance.damping[0] = np.nan
     assert "both forms of the torque, noninteracting" in failed(probe)
 
 
-def test_a_low_rate_is_warned_of_before_it_destabilises(tmp_path: Path) -> None:
-    """At 100 Hz the relative loop of 31 /s has too few ticks; at 10 Hz its torque diverges."""
+def test_a_low_rate_warns_before_it_destabilizes(tmp_path: Path) -> None:
+    """At 100 Hz the relative loop of 31 1/s has too few ticks; at 10 Hz it diverges."""
     slow = run_check(scenario_file(tmp_path, rate=100.0, telemetry_rate=50.0), FEW)
     assert slow.passed
     assert len(slow.warnings) == 3
@@ -146,8 +146,8 @@ def test_a_low_rate_is_warned_of_before_it_destabilises(tmp_path: Path) -> None:
     ]
 
 
-def test_growth_is_what_stepping_the_loop_shows() -> None:
-    """The growth per tick is the limit of a norm's ratio when the held loop is stepped."""
+def test_growth_is_that_of_the_stepped_loop() -> None:
+    """The growth per tick is the limit of the ratio of norms of the stepped loop."""
     M, D, K, rate = 2.0, 3.0, 40.0, 50.0
     loop = Loop("one", *(np.array([[value]]) for value in (M, D, K)), rate)
     e, speed, norms = 1.0, 0.0, []
@@ -159,7 +159,7 @@ def test_growth_is_what_stepping_the_loop_shows() -> None:
 
 
 def dense_growth(team: Team, stack: SubtaskStack, impedance: Impedance, rate: float) -> float:
-    """Of joints that are pushed by J'(-D e_rate - K e), exactly over a tick with this held."""
+    """Return the growth under J'(-D e_rate - K e) with zero-order hold, exactly discretized."""
     state = team.state(team.q0, np.zeros(team.n))
     J, n = stack.evaluate(state).J, team.n
     # e = J q: the state is (q, v, torque), and the torque holds.
@@ -172,8 +172,8 @@ def dense_growth(team: Team, stack: SubtaskStack, impedance: Impedance, rate: fl
 
 
 @pytest.mark.parametrize("damping", [90.0, 900.0])
-def test_the_loop_that_closed_gates_leave_is_judged_too(tmp_path: Path, damping: float) -> None:
-    """With sigma at 0 all subtasks are coupled, and may diverge where each alone is stable."""
+def test_the_loop_with_closed_gates_is_checked(tmp_path: Path, damping: float) -> None:
+    """With sigma = 0 subtasks are coupled and may diverge though each alone is stable."""
     values = read_parameters(ROOT / "config" / "planar_arms.yaml")
     values["relative"]["damping"] = [damping]
     values["rate"] = 500.0
@@ -192,8 +192,8 @@ def test_the_loop_that_closed_gates_leave_is_judged_too(tmp_path: Path, damping:
     assert failing == (["growth per tick, all subtasks at sigma = 0"] if expected > 1.0 else [])
 
 
-def test_an_unstable_loop_says_what_would_cure_it() -> None:
-    """The rate and the share of the damping that it names are stable; a little less is not."""
+def test_an_unstable_loop_suggests_a_remedy() -> None:
+    """The suggested rate and share of damping are stable; slightly worse values are not."""
     M, D, K = (np.diag(values) for values in ([1.0, 0.02], [10.0, 60.0], [30.0, 30.0]))
     loop = Loop("arms", M, D, K, 1000.0)
     assert loop.growth == pytest.approx(2.0, abs=0.02)
@@ -209,8 +209,8 @@ def test_an_unstable_loop_says_what_would_cure_it() -> None:
     assert "times its damping" in weak.warning()
 
 
-def test_the_gains_of_two_pandas_are_stable_whether_gates_are_open_or_closed() -> None:
-    """They were not: damping made for M_i was too much for a wrist that Lambda leaves alone."""
+def test_the_gains_of_two_pandas_are_stable_with_open_and_closed_gates() -> None:
+    """Damping designed for M_i was once too large for the natural inertia of a wrist."""
     for name in ("dual_panda", "dual_panda_free"):
         report = run_check(name, FEW)
         assert report.passed
@@ -218,12 +218,12 @@ def test_the_gains_of_two_pandas_are_stable_whether_gates_are_open_or_closed() -
 
 
 def test_natural_is_one_loop_of_all_subtasks(tmp_path: Path) -> None:
-    """The natural law couples its subtasks, so its modes are those of all of them."""
+    """The natural law couples its subtasks, so that its modes involve all of them."""
     report = run_check(scenario_file(tmp_path, law="natural"), FEW)
     assert [item["loop"] for item in report.as_dict()["loops"]] == ["all subtasks"]
 
 
-def test_a_builtin_check_goes_before_a_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_builtin_check_has_precedence_over_a_scenario(monkeypatch: pytest.MonkeyPatch) -> None:
     """A target that names a built-in check runs that check."""
     expected = CheckReport("law", (), (), ())
     monkeypatch.setitem(check.BUILT_IN, "law", lambda settings, others: expected)
@@ -235,10 +235,10 @@ def run_command(monkeypatch: pytest.MonkeyPatch, *arguments: str) -> int:
     return cli.main()
 
 
-def test_the_command_prints_every_claim(
+def test_the_command_prints_every_check(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The command exits with 0 and its JSON holds each claim with its limit."""
+    """The command exits with 0 and its JSON has each check with its limit."""
     assert run_command(monkeypatch, "paper", "--samples", "2", "--json") == 0
     printed = json.loads(capsys.readouterr().out)
     assert printed["passed"] is True
@@ -248,10 +248,10 @@ def test_the_command_prints_every_claim(
     assert all(item["limit"] is not None for item in printed["checks"])
 
 
-def test_the_command_exits_by_what_it_finds(
+def test_the_exit_status_reports_failures(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Status 1 where a claim fails, 2 where there is no such scenario."""
+    """The status is 1 if a check fails, 2 if the scenario does not exist."""
     unstable = scenario_file(tmp_path, rate=10.0, telemetry_rate=10.0)
     assert run_command(monkeypatch, unstable, "--samples", "2") == 1
     assert "growth per tick, relative" in capsys.readouterr().out

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The delay experiment: unstable without the passivity layer, settled with it."""
+"""Teleoperation with delay: unstable without the passivity layer, settled with it."""
 
 import json
 
@@ -13,8 +13,8 @@ from noninteract_ros.validation.check import BUILT_IN, CheckSettings
 from noninteract_ros.validation.delay import LinkRun, run, scenario
 
 
-def test_without_passivity_the_loop_is_stable_at_once_and_unstable_with_a_delay() -> None:
-    """The same hand and wall: at rest without a delay, shaking at 50 ms, drawing energy."""
+def test_without_passivity_a_delay_destabilizes_the_loop() -> None:
+    """The hand rests without delay; at 50 ms it oscillates and draws energy."""
     still, shaking = (run(scenario("wall", d, "none"), 3.0) for d in (0.0, 0.05))
     assert still.rms_speed < 0.02
     assert still.drawn < 0.01
@@ -23,20 +23,20 @@ def test_without_passivity_the_loop_is_stable_at_once_and_unstable_with_a_delay(
 
 
 @pytest.mark.parametrize("place", ["wall", "carrying"])
-def test_with_passivity_it_settles_and_no_more_than_the_bound_is_drawn(place: str) -> None:
-    """At 200 ms one way with jitter and losses the team gets where it is led."""
+def test_with_passivity_the_loop_settles_within_the_energy_bound(place: str) -> None:
+    """At 200 ms one way the team reaches its reference."""
     kept = run(scenario(place, 0.2, "tdpa"))
     assert kept.rms_speed < 0.02
     assert kept.excess <= ROUNDING
     assert kept.surprise < 1e-3
     assert kept.offset[-1] < (0.05 if place == "wall" else 0.002)
-    force = np.linalg.norm(kept.feedback[-500:].mean(axis=0))  # The tremor is felt, too.
+    force = np.linalg.norm(kept.feedback[-500:].mean(axis=0))  # Average over the tremor.
     assert (force > 3.0) if place == "wall" else (force < 0.1)
 
 
 @pytest.mark.parametrize(("place", "delay"), [("wall", 0.2), ("carrying", 0.1)])
-def test_with_waves_it_settles_too(place: str, delay: float) -> None:
-    """The other layer that a scenario can choose."""
+def test_with_wave_variables_the_loop_settles(place: str, delay: float) -> None:
+    """The second passivity layer settles as well."""
     kept = run(scenario(place, delay, "waves"))
     assert kept.rms_speed < 0.04
     assert kept.excess <= ROUNDING
@@ -51,8 +51,8 @@ def small(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("small")
-def test_the_table_has_a_row_and_claims_for_what_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
-    """`noninteract check delay`, made short."""
+def test_the_table_has_rows_and_checks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A short `noninteract check delay` has one row and its checks."""
     monkeypatch.setattr(delay, "NETWORKS", {"varying": delay.VARYING})
     report = BUILT_IN["delay"](CheckSettings(samples=1), ())
     (section,) = report.sections
@@ -64,7 +64,7 @@ def test_the_table_has_a_row_and_claims_for_what_is_kept(monkeypatch: pytest.Mon
 
 
 def made_up(net: float, budget: float, speed: float, offset: float) -> LinkRun:
-    """A run of which the account, the hand and the team are as they are said to be."""
+    """Create a run with constant account, hand speed and offset."""
     t = np.linspace(0.0, 4.0, 41)
     hand, feedback = np.full((41, 2), speed), np.zeros((41, 2))
     net_row, budget_row = np.full(41, net), np.full(41, budget)
@@ -86,14 +86,14 @@ GOOD = {"net": -0.1009, "budget": -0.0009, "speed": 0.01, "offset": 0.04}
         ({"offset": 0.06}, "offset of hand and team, wall, 50 ms, varying"),
     ],
 )
-def test_one_network_of_several_that_breaks_a_claim_fails_the_check(
+def test_a_violation_in_one_network_fails_the_check(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     wrong: dict[str, float],
     claim: str,
     seed: int,
 ) -> None:
-    """The exit code and JSON say so, whichever seed it is."""
+    """Exit status and JSON report it for every seed."""
 
     def found(changed, duration=0.0):
         link = delay.link_of(changed)
@@ -105,17 +105,19 @@ def test_one_network_of_several_that_breaks_a_claim_fails_the_check(
     monkeypatch.setattr(delay, "run", found)
     monkeypatch.setattr("sys.argv", ["noninteract", "check", "delay", "--json"])
     code = cli.main()
-    told = json.loads(capsys.readouterr().out)
+    printed = json.loads(capsys.readouterr().out)
     assert code == (1 if claim else 0)
-    assert told["passed"] is not bool(claim)
-    failed = [item["name"] for item in told["checks"] if not item["passed"]]
+    assert printed["passed"] is not bool(claim)
+    failed = [item["name"] for item in printed["checks"] if not item["passed"]]
     assert failed == ([claim] if claim else [])
-    assert [row["network"] for row in told["delay"]] == ["constant", "varying"]
+    assert [row["network"] for row in printed["delay"]] == ["constant", "varying"]
 
 
 @pytest.mark.usefixtures("small")
-def test_a_loop_that_is_stable_without_it_shows_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The experiment must be able to tell the difference."""
+def test_a_loop_that_is_stable_without_passivity_fails_the_check(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The experiment must show the effect of the passivity layer."""
     monkeypatch.setattr(delay, "run", lambda _: made_up(**GOOD))
     report = BUILT_IN["delay"](CheckSettings(), ())
     (failed,) = [check for check in report.checks if not check.passed]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The gauntlet: its loops against the product's controller, its verdicts against each other."""
+"""Gauntlet: its loops agree with the controller, its verdicts with each other."""
 
 import json
 from dataclasses import astuple
@@ -39,8 +39,8 @@ HALF_TICK = 0.5e-3
 CASES = (0, 3, 4, 9, 14)
 
 
-def test_the_compiled_account_is_the_products_to_the_last_bit() -> None:
-    """Random intervals, booked one after the other by both, leave the same numbers."""
+def test_the_compiled_account_is_bit_equal_to_the_controllers() -> None:
+    """Random intervals give identical accounts."""
     settings = TankSettings()
     compiled = ACCOUNT.settings_of(settings)
     ours = ACCOUNT.full_tank(compiled, 0.3)
@@ -58,7 +58,7 @@ def test_the_compiled_account_is_the_products_to_the_last_bit() -> None:
 
 
 def robots_of(case: Case) -> list[Robot]:
-    """The same robots as the product has them."""
+    """Build the robots of a case with the package's models."""
     if not case.arms:
         axes = AXES[: case.axes]
         masses = case.team.masses[:: case.axes]
@@ -74,7 +74,7 @@ def robots_of(case: Case) -> list[Robot]:
 
 
 def controller_of(case: Case, law: str) -> TeamController:
-    """The product's controller of a case, told to keep all errors at zero."""
+    """Build the controller of a case, with references at zero error."""
     gravity = (0.0, -9.81, 0.0) if case.arms and case.team.arms[0, 6] else (0.0, 0.0, 0.0)
     team = Team(robots_of(case), gravity)
     axes = AXES[: case.axes]
@@ -103,12 +103,12 @@ def controller_of(case: Case, law: str) -> TeamController:
     [*((law, 0, 0.0) for law in LAWS), ("energy_gated", 3, 0.0), ("energy_gated", 0, 0.2)],
 )
 @pytest.mark.parametrize("index", CASES)
-def test_torques_and_account_are_the_products(
+def test_torques_and_account_agree_with_the_controller(
     index: int, law: str, delay: int, drop: float
 ) -> None:
-    """The product's controller, shown the gauntlet's states, commands and books the same.
+    """The controller has the same torques and account at the states of the gauntlet.
 
-    A small tank, so that it runs empty and both gates move within the second.
+    A small tank runs empty, so that both gates move within the second.
     """
     tank = TankSettings(capacity=0.02, initial=0.01, reopening_level=0.015, full_gate=0.01)
     settings = GauntletSettings(delay=delay, drop=drop, tank=tank)
@@ -136,7 +136,7 @@ def test_torques_and_account_are_the_products(
 
 
 def held_by_ode(case: Case, torque: np.ndarray) -> tuple[np.ndarray, float]:
-    """A tick of point masses with their surroundings, and its heat, by an adaptive integrator."""
+    """Return state and heat after a tick of point masses, by an adaptive integrator."""
     around, n = case.around, case.team.n
     m = len(around.rest)
     inertia = around.inertia.copy()
@@ -159,8 +159,8 @@ def held_by_ode(case: Case, torque: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 @pytest.mark.parametrize("index", [i for i in range(12) if i % cases.ARMS_EVERY != 4])
-def test_a_tick_of_the_plant_is_what_an_integrator_finds(index: int) -> None:
-    """Exact hold and midpoint rule move point masses as an adaptive method does."""
+def test_a_tick_of_the_plant_agrees_with_an_integrator(index: int) -> None:
+    """Exact discretization and midpoint rule agree with an adaptive method."""
     case = make_case(4, index, HALF_TICK)
     torque = np.linspace(-3.0, 5.0, case.team.n)
     z, z_rate = case.start[0].copy(), case.start[1].copy()
@@ -173,7 +173,7 @@ def test_a_tick_of_the_plant_is_what_an_integrator_finds(index: int) -> None:
 
 
 def door() -> Case:
-    """The example of the derivations: two robots on one door at different radii."""
+    """Return the example of the derivations: two robots on one door at different radii."""
     mixing = cases.task_matrix(2, 1)
     S = np.linalg.inv(mixing)
     masses = np.array([1.0, 4.0])
@@ -189,8 +189,8 @@ def door() -> Case:
     return Case(0, team, around, [lever], np.array([[0.01, 0.01], [0.0, 0.0]]), 2, 1)
 
 
-def test_the_door_grows_as_stated_and_settles_when_gated() -> None:
-    """The noninteracting loop grows with 17.8 /s, a little less at 1 kHz; passive laws rest."""
+def test_the_door_diverges_as_stated_and_settles_with_gates() -> None:
+    """The noninteracting loop grows at 17.8 1/s, slightly less at 1 kHz; passive laws settle."""
     case = door()
     assert growth_rate(case, 1e-5, 0, 1.0, 1.0) == pytest.approx(17.76, abs=0.01)
     assert growth_rate(case, 1e-3, 0, 1.0, 1.0) == pytest.approx(17.68, abs=0.01)
@@ -204,8 +204,8 @@ def test_the_door_grows_as_stated_and_settles_when_gated() -> None:
     assert found["energy_gated"].sigma_least < 0.7
 
 
-def test_few_cases_pass_and_the_paper_does_not() -> None:
-    """Passive laws bring 60 cases to rest, residuals are rounding, verdicts agree."""
+def test_passive_laws_settle_and_the_noninteracting_law_may_not() -> None:
+    """60 cases settle under passive laws, residuals are rounding, verdicts agree."""
     settings = GauntletSettings(cases=60, seed=1, jobs=1)
     verdicts = run_cases(settings)
     report = counted(settings, verdicts)
@@ -224,8 +224,8 @@ def test_few_cases_pass_and_the_paper_does_not() -> None:
         (TankSettings(initial=1e6, capacity=1e6), "not at rest, energy_gated"),
     ],
 )
-def test_a_broken_account_is_found_out(tank: TankSettings, claim: str) -> None:
-    """A refill of more than was absorbed shows in the residual; a purse without end in counts."""
+def test_a_broken_account_fails(tank: TankSettings, claim: str) -> None:
+    """Excessive refilling shows in the residual, an unlimited tank in the counts."""
     settings = GauntletSettings(
         cases=50, seed=1, jobs=1, laws=("energy_gated",), horizon=30.0, tank=tank
     )
@@ -234,7 +234,7 @@ def test_a_broken_account_is_found_out(tank: TankSettings, claim: str) -> None:
 
 
 def test_a_case_depends_on_its_number_alone() -> None:
-    """Case 17 of a seed is the same whatever else is drawn, and differs from seed to seed."""
+    """Case 17 is the same for equal seeds and differs between seeds."""
     first, again = make_case(5, 17, HALF_TICK), make_case(5, 17, HALF_TICK)
     np.testing.assert_array_equal(first.start, again.start)
     np.testing.assert_array_equal(first.team.stiffness, again.team.stiffness)
@@ -243,7 +243,7 @@ def test_a_case_depends_on_its_number_alone() -> None:
 
 @pytest.mark.parametrize("index", range(40))
 def test_surroundings_are_passive(index: int) -> None:
-    """Matrices of every element are symmetric and semidefinite, energies are not negative."""
+    """All matrices are symmetric and positive semidefinite, energies are not negative."""
     around: SurroundingsArrays = make_case(3, index, HALF_TICK).around
     for matrix in (around.inertia, around.stiffness, around.damping):
         np.testing.assert_allclose(matrix, matrix.T)
@@ -254,23 +254,23 @@ def test_surroundings_are_passive(index: int) -> None:
     assert (around.gaps >= 0.0).all()
 
 
-def test_the_command_tells_one_case_in_full(
+def test_the_command_reports_one_case_in_detail(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path
 ) -> None:
-    """Case by number, as a table and as JSON in a file."""
+    """It prints tables and writes JSON to a file."""
     file = tmp_path / "case.json"
     arguments = ["check", "gauntlet", "--case", "3", "--seed", "1", "--json", str(file)]
     monkeypatch.setattr("sys.argv", ["noninteract", *arguments])
     assert cli.main() == 0
     assert "course under energy_gated" in capsys.readouterr().out.lower()
-    told = json.loads(file.read_text())
-    assert [row["law"] for row in told["outcomes"]] == list(LAWS)
+    report = json.loads(file.read_text())
+    assert [row["law"] for row in report["outcomes"]] == list(LAWS)
 
 
-def test_an_unknown_law_is_refused(
+def test_an_unknown_law_is_rejected(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The message names the option and what is allowed."""
+    """The message lists the allowed laws."""
     monkeypatch.setattr("sys.argv", ["noninteract", "check", "gauntlet", "--law", "gated"])
     assert cli.main() == 2
     assert "energy_gated" in capsys.readouterr().err

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`noninteract check identities`: the law's identities on the team of every scenario."""
+"""`noninteract check identities`: identities of the law on the team of every scenario."""
 
 import json
 from pathlib import Path
@@ -37,8 +37,8 @@ def failed(report: CheckReport) -> set[str]:
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_the_law_s_identities_hold_on_every_team(scenario: str) -> None:
-    """They hold at random states in the joints' whole range, away from singularities."""
+def test_identities_hold_on_every_team(scenario: str) -> None:
+    """They hold at random states in the whole joint range, away from singularities."""
     report = run_check("identities", CheckSettings(samples=12, seed=7), [scenario])
     assert report.passed, failed(report)
     measured = {item.name.partition(": ")[2].split(",")[0] for item in report.checks}
@@ -46,7 +46,7 @@ def test_the_law_s_identities_hold_on_every_team(scenario: str) -> None:
 
 
 def test_a_slightly_wrong_coriolis_term_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A millionth too much in C~_i fails what rests on it, on arms but not on masses."""
+    """A relative error of 1e-6 in C~_i fails its identities on arms but not on point masses."""
     right = plain_form.subtask_coriolis
 
     def wrong(dynamics: TaskDynamics) -> tuple[np.ndarray, ...]:
@@ -57,11 +57,11 @@ def test_a_slightly_wrong_coriolis_term_is_found(monkeypatch: pytest.MonkeyPatch
     skew = {f"dM_i/dt - 2 C~_i is skew, {name}" for name in ("cooperative", "relative", "posture")}
     broken = {*skew, "both forms of the torque, noninteracting"}
     assert failed(report) == {f"dual_panda: {name}" for name in broken}
-    assert len(report.tables()) == 3  # The legend, the residuals, and what failed.
+    assert len(report.tables()) == 3  # Legend, residuals and failed checks.
 
 
 def test_a_slightly_wrong_jacobian_rate_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A millionth too little in the Jacobian's rate is found, too."""
+    """A relative error of 1e-6 in the rate of the Jacobian fails."""
     right = SubtaskStack.evaluate
 
     def wrong(stack: SubtaskStack, state: TeamState) -> SubtaskState:
@@ -75,7 +75,7 @@ def test_a_slightly_wrong_jacobian_rate_is_found(monkeypatch: pytest.MonkeyPatch
 
 
 def test_residuals_have_no_units(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A term that is wrong by 1e-6 has the same residual in metres and in millimetres."""
+    """A relative error of 1e-6 has the same residual in metres and in millimetres."""
     right, evaluate = plain_form.subtask_coriolis, SubtaskStack.evaluate
 
     def wrong(dynamics: TaskDynamics) -> tuple[np.ndarray, ...]:
@@ -96,8 +96,8 @@ def test_residuals_have_no_units(monkeypatch: pytest.MonkeyPatch) -> None:
     assert min(in_metres) > SKEW.limit
 
 
-def test_states_are_regular_and_none_is_lost() -> None:
-    """As many states as asked for, all regular, and the same ones for the same seed."""
+def test_states_are_regular_complete_and_reproducible() -> None:
+    """The requested number of states is regular and equal for equal seeds."""
     probe = arms_probe()
     least = REGULAR * best_regularity(probe.team, probe.stack)
     samples = list(probe.samples(50, seed=1))
@@ -109,7 +109,7 @@ def test_states_are_regular_and_none_is_lost() -> None:
 
 
 def test_a_team_without_regular_states_ends_the_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where no state is taken, the search ends with an error."""
+    """If all states are rejected, the search raises an error."""
     monkeypatch.setattr(LawProbe, "_jumps", lambda *_: True)
     with pytest.raises(TeamError, match="singular"):
         next(arms_probe().samples(1, seed=0))
@@ -118,7 +118,7 @@ def test_a_team_without_regular_states_ends_the_search(monkeypatch: pytest.Monke
 def test_the_command_takes_scenarios(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It measures the scenarios it is given, prints JSON, and says what it does not know."""
+    """It measures the given scenarios, prints JSON, and rejects unknown names."""
 
     def run(*arguments: str) -> int:
         monkeypatch.setattr("sys.argv", ["noninteract", "check", *arguments])
@@ -132,11 +132,11 @@ def test_the_command_takes_scenarios(
     assert run("paper", "planar_arms") == 2
 
 
-def test_scenarios_without_their_robots_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Without the extra the others are measured; asked for by name, it is an error."""
-    left = {name: ROOT / "config" / f"{name}.yaml" for name in ("dual_panda", "paper")}
+def test_scenarios_without_robot_models_are_skipped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without the extra, only the other scenarios are measured."""
+    scenarios = {name: ROOT / "config" / f"{name}.yaml" for name in ("dual_panda", "paper")}
     monkeypatch.setattr(
-        "noninteract_ros.validation.identities.identities.known_scenarios", lambda: left
+        "noninteract_ros.validation.identities.identities.known_scenarios", lambda: scenarios
     )
     monkeypatch.setattr(
         "noninteract_ros.team.models.urdf_files.share_folders", lambda: [Path("/none")]

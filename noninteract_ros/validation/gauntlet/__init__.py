@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random passive environments against the laws, in compiled simulations."""
+"""Stability of the laws in contact with random passive environments, in compiled simulations."""

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The product's own energy account, translated so that it can be compiled.
+"""Compiled copy of the controller's energy account.
 
-Nothing of its arithmetic is written a second time: the source of `control.energy_tank` is read,
-its frozen dataclasses become named tuples, which Numba knows, and every function is compiled. A
-change of the account is a change of what the gauntlet judges.
+The source of `control.energy.tank` is translated, not duplicated: frozen dataclasses become named
+tuples, which Numba supports, and every function is compiled. A change of the account also changes
+the account of the gauntlet.
 """
 
 import ast
@@ -30,7 +30,7 @@ class CompiledAccount:
         full_tank: (settings, potential) -> tank.
         step: (tank, interval, settings) -> tank.
         observed: (tank, sigma) -> tank, for laws without gates.
-        interval: Type of what was measured over a tick; same fields as `energy_tank.Interval`.
+        interval: Type of the quantities of one tick; same fields as `energy_tank.Interval`.
         tank: Type of the account's state; same fields as `energy_tank.EnergyTank`.
         settings: Type of the settings; same fields as `energy_tank.TankSettings`.
     """
@@ -43,13 +43,13 @@ class CompiledAccount:
     settings: type
 
     def settings_of(self, chosen: TankSettings) -> Any:
-        """Settings as compiled code takes them."""
+        """Convert settings for compiled code."""
         return self.settings(*(float(value) for value in astuple(chosen)))
 
 
 @cache
 def compiled_account() -> CompiledAccount:
-    """Translate the account; its functions are compiled where they are first called."""
+    """Translate the account; its functions are compiled at their first call."""
     types = _twins(energy_tank)
     translated = _Translation(types)
     functions = translated.visit(_functions(energy_tank))
@@ -58,7 +58,7 @@ def compiled_account() -> CompiledAccount:
     for source in (*replacing, *map(ast.unparse, functions.body)):
         exec(source, space)
     originals = [item for item in space.values() if inspect.isfunction(item)]
-    # One case at a time is all that the gauntlet asks of functions that take arrays as well.
+    # Compiled cases are scalar; the original functions accept arrays as well.
     scalar = {"_less": _less, "_greater": _greater}
     for item in originals:
         space[item.__name__] = compiled(scalar.get(item.__name__, item))
@@ -75,7 +75,7 @@ def _greater(first: float, second: float) -> float:
 
 
 def _twins(module: ModuleType) -> dict[str, Any]:
-    """A named tuple with the fields and defaults of each dataclass of a module."""
+    """Create a named tuple with the fields of each dataclass of a module."""
     return {
         name: namedtuple(name, [item.name for item in fields(kind)])
         for name, kind in vars(module).items()
@@ -89,7 +89,7 @@ def _functions(module: ModuleType) -> ast.Module:
 
 
 class _Translation(ast.NodeTransformer):
-    """Write `replace(tank, a=x)` as `replace_a(tank, x)`; drops annotations.
+    """Translation of `replace(tank, a=x)` to `replace_a(tank, x)`, without annotations.
 
     Args:
         types: The named tuples, by name.
@@ -103,7 +103,7 @@ class _Translation(ast.NodeTransformer):
         self.used: set[tuple[str, ...]] = set()
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.FunctionDef:
-        """A function without annotations; their types are those of the original."""
+        """Remove the annotations of a function."""
         for argument in node.args.args:
             argument.annotation = None
         node.returns = None
@@ -111,7 +111,7 @@ class _Translation(ast.NodeTransformer):
         return node
 
     def visit_Call(self, node: ast.Call) -> ast.Call:
-        """A call, of a function of its own where it replaces fields."""
+        """Translate a call of `replace` or of a constructor."""
         self.generic_visit(node)
         name = node.func.id if isinstance(node.func, ast.Name) else ""
         if name in self._types:
@@ -126,14 +126,14 @@ class _Translation(ast.NodeTransformer):
 
     @staticmethod
     def _all_fields(kind: Any, node: ast.Call) -> list[ast.expr]:
-        """Values of all fields in their order, as compiled constructors want them."""
+        """Return the values of all fields in order, as compiled constructors require."""
         given = dict(zip(kind._fields, node.args, strict=False))
         given |= {str(item.arg): item.value for item in node.keywords}
         return [given[name] for name in kind._fields]
 
 
 def replacement(names: tuple[str, ...], kind: Any) -> str:
-    """Source of the function that replaces some fields of a named tuple."""
+    """Return the source of a function that replaces fields of a named tuple."""
     values = ", ".join(name if name in names else f"old.{name}" for name in kind._fields)
     head = f"def {'_'.join(('replace', *names))}(old, {', '.join(names)}):"
     return f"{head}\n    return {kind.__name__}({values})\n"

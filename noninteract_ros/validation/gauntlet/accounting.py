@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The account in the loop of a case: what is booked from state to state, and its residual."""
+"""Update of the energy account in the loop of a case, and its residual."""
 
 from typing import Any
 
@@ -25,7 +25,7 @@ Interval = ACCOUNT.interval
 
 @compiled
 def gates_of(law: int, tank: Any) -> Any:
-    """The account with the gates that a law has."""
+    """Return the account with the gates of a law."""
     if law == GATED:
         return tank
     return observed(tank, 0.0 if law == NATURAL else 1.0)
@@ -43,15 +43,15 @@ def book(
     settings: Any,
     meter: Meter,
 ) -> Any:
-    """The account after the interval since the last state that arrived."""
-    elapsed, natural, beyond, error = now - memory.seen[0], 0.0, 0.0, 0.0
+    """Return the account after the interval since the last received state."""
+    elapsed, natural, beyond, error = now - memory.received[0], 0.0, 0.0, 0.0
     for i in range(team.n):
-        way = memory.q[i] - memory.q_seen[i]
-        natural += applied[0, i] * way
-        beyond += applied[1, i] * way
-        error += (applied[0, i] + applied[1, i]) * (way - elapsed * memory.v_seen[i])
+        step = memory.q[i] - memory.q_received[i]
+        natural += applied[0, i] * step
+        beyond += applied[1, i] * step
+        error += (applied[0, i] + applied[1, i]) * (step - elapsed * memory.v_received[i])
     meter.naive[0] += error
-    natural -= terms.energies[LIFTED] - memory.seen[1]
+    natural -= terms.energies[LIFTED] - memory.received[1]
     impedance_force(team, terms, 1.0, memory.force[0])
     complete_force(team, terms, law == PAPER, memory.force[0], memory.force[1])
     demand = power(team, terms, memory.force[1])
@@ -61,23 +61,23 @@ def book(
 
 
 @compiled
-def see(team: TeamArrays, terms: Terms, memory: Memory, now: float) -> None:
-    """Remembers the state that has arrived."""
-    copy(memory.q, memory.q_seen)
-    copy(memory.v, memory.v_seen)
-    memory.seen[0], memory.seen[1] = now, terms.energies[LIFTED]
+def store_state(team: TeamArrays, terms: Terms, memory: Memory, now: float) -> None:
+    """Store the received state."""
+    copy(memory.q, memory.q_received)
+    copy(memory.v, memory.v_received)
+    memory.received[0], memory.received[1] = now, terms.energies[LIFTED]
 
 
 @compiled
 def stored(terms: Terms, tank: Any) -> float:
-    """W, the storage of the port [J]."""
+    """Return W, the storage of the port [J]."""
     return terms.energies[KINETIC] + tank.grip * tank.potential + tank.reserve + tank.level
 
 
 @compiled
-def weigh(terms: Terms, memory: Memory, tank: Any, meter: Meter) -> None:
-    """Residual and what it is compared with, where the account is up to date."""
-    supplied = -(memory.outside[0] + memory.outside[1] - memory.began[1]) - memory.heat[0]
+def update_residual(terms: Terms, memory: Memory, tank: Any, meter: Meter) -> None:
+    """Update the residual and its comparison values with a current account."""
+    supplied = -(memory.environment[0] + memory.environment[1] - memory.began[1]) - memory.heat[0]
     meter.now[0] = stored(terms, tank) - memory.began[0] - supplied
     meter.residual[0] = max(meter.residual[0], meter.now[0])
     meter.mismatch[0] = max(meter.mismatch[0], abs(meter.now[0] + tank.lost))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What compiled code is given of a case, and the few operations on small matrices it needs.
+"""Arrays of a case for compiled code, and operations on small matrices.
 
-Plain loops over arrays that exist already: they compile in a fraction of the time that array
-expressions take, and allocate nothing.
+Loops over preallocated arrays compile in a fraction of the time of array expressions and do not
+allocate memory.
 """
 
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from noninteract_ros.arrays import Array
 
 Block = tuple[float, float, float, float]  # a 2 x 2 matrix, row by row
 
-# Vectors of four or six numbers gain nothing from it, and compiling takes half as long again.
+# Vectors of four or six numbers do not benefit, and vectorizing adds half to the compile time.
 config.LOOP_VECTORIZE = 0
 config.SLP_VECTORIZE = 0
 
@@ -26,7 +26,7 @@ def compiled(function: Callable[..., Any]) -> Any:
 
 
 class TeamArrays(NamedTuple):
-    """Robots, subtasks and gains; tools move along n coordinates y, and x = A y.
+    """Robots, subtasks and gains; tools have n coordinates y, and x = A y.
 
     Attributes:
         n: Number of coordinates.
@@ -53,7 +53,7 @@ class TeamArrays(NamedTuple):
 
 
 class SurroundingsArrays(NamedTuple):
-    """A passive environment at tool coordinates and bodies of its own, z = (y, bodies).
+    """Passive environment at the tool coordinates and its own bodies, z = (y, bodies).
 
     Attributes:
         inertia: Masses carried and bodies, shape (m, m) [kg].
@@ -63,7 +63,7 @@ class SurroundingsArrays(NamedTuple):
         preload: Their energy at z = 0 [J].
         directions: Unit vectors of one-sided contacts, shape (c, m).
         contact_stiffness: Their springs, shape (c,) [N/m].
-        gaps: Way along each direction at which it touches, shape (c,) [m].
+        gaps: Distance along each direction to contact, shape (c,) [m].
     """
 
     inertia: Array
@@ -193,7 +193,7 @@ def put(A: Array, at: int, block: Block) -> None:
 
 @compiled
 def solve_in_place(A: Array, b: Array) -> None:
-    """Replaces b by A^-1 b and A by its Cholesky factor; A symmetric, positive definite."""
+    """Replace b by A^-1 b and A by its Cholesky factor; A is symmetric positive definite."""
     m = len(b)
     for i in range(m):
         for j in range(i + 1):

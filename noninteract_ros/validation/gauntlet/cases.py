@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random cases of the gauntlet: unlike robots, gains and something passive that they touch."""
+"""Random cases of the gauntlet: unequal robots, gains and passive environments."""
 
 from dataclasses import dataclass
 
@@ -17,28 +17,28 @@ from noninteract_ros.validation.gauntlet.surroundings import (
 )
 
 TEAMS = ((2, 1), (2, 2), (3, 1), (3, 2))  # robots and axes of teams of point masses
-ARMS_EVERY = 5  # one case in so many has planar arms
-UNLIKE = (2.0, 8.0)  # mass of the other robots by that of the lightest one
+ARMS_EVERY = 5  # every fifth case has planar arms
+UNLIKE = (2.0, 8.0)  # mass of the other robots relative to the lightest one
 STIFFNESS = (10.0, 2000.0)  # [N/m]
-GRASP = ((10.0, 200.0), (200.0, 2000.0))  # [N/m] a soft mean and stiff differences
+GRASP = ((10.0, 200.0), (200.0, 2000.0))  # [N/m] soft mean and stiff differences
 GRASPING = 0.5  # share of the cases with gains as for a grasp
 ARMS_STIFFNESS = (200.0, 2000.0)  # [N/m] softer arms leave their workspace
 ARMS_GRASP = ((100.0, 300.0), (500.0, 3000.0))  # [N/m]
 RATIO = (0.1, 2.0)  # damping ratio of each subtask by itself
-FASTEST = 100.0  # [rad/s] of a subtask by itself
-SAFE = 0.5  # share of what delay and sampling allow that a designer uses
+FASTEST = 100.0  # [rad/s] largest natural frequency of a subtask by itself
+SAFE = 0.5  # gains relative to the limit due to delay and sampling
 GRAVITY = 9.81  # [m/s^2]
 
 
 @dataclass(frozen=True)
 class Case:
-    """A case, complete.
+    """Complete case.
 
     Attributes:
-        index: Its number.
+        index: Number of the case.
         team: Robots, subtasks and gains.
-        around: What they touch, as matrices.
-        elements: The same, one by one.
+        around: Environment as matrices.
+        elements: Elements of the environment.
         start: q and v at the start, robots first, shape (2, m).
         robots: Number of robots.
         axes: Axes of each.
@@ -54,29 +54,29 @@ class Case:
 
     @property
     def arms(self) -> bool:
-        """Whether the robots are planar arms."""
+        """True if the robots are planar arms."""
         return len(self.team.arms) > 0
 
     @property
     def linear(self) -> bool:
-        """Whether the loop of a law without gates is linear."""
+        """True if the loop of a law without gates is linear."""
         return not self.arms and not len(self.around.gaps)
 
     @property
     def kind(self) -> str:
-        """Robots and what they touch, in a few words."""
+        """Short description of robots and environment."""
         robots = "planar arms" if self.arms else f"point masses on {self.axes} axes"
         return f"{self.robots} {robots}; {', '.join(item.kind for item in self.elements)}"
 
 
 def make_case(seed: int, index: int, reaction: float) -> Case:
-    """A case by its number; nothing else of a gauntlet changes it.
+    """Create a case, determined by seed, number and reaction time alone.
 
     Args:
         seed: Seed of the gauntlet.
         index: Number of the case.
-        reaction: Mean age of the torque that acts, half a tick plus the delay [s]; gains are
-            limited to what it allows without an environment.
+        reaction: Mean age of the applied torque, half a tick plus the delay [s]; limits the gains
+            to those stable without environment.
     """
     rng = np.random.default_rng([seed, index])
     if index % ARMS_EVERY == ARMS_EVERY - 1:
@@ -124,7 +124,7 @@ def _arms_case(rng: np.random.Generator, index: int, reaction: float) -> Case:
 
 
 def _arm(rng: np.random.Generator, mass: float, gravity: float) -> Array:
-    """Uniform rods: lengths, alpha, beta, delta and the weights' levers, shape (7,)."""
+    """Return lengths, alpha, beta, delta and gravity torques of two uniform rods, shape (7,)."""
     l1, l2 = rng.uniform(0.4, 0.6, 2)
     m1, m2 = mass * rng.uniform(0.5, 1.5, 2)
     beta, delta = 0.5 * m2 * l1 * l2, m2 * l2**2 / 3.0
@@ -138,7 +138,7 @@ def _pose(rng: np.random.Generator) -> Array:
 
 
 def task_matrix(robots: int, axes: int) -> Array:
-    """A of the mean and of the differences along a chain, shape (n, n)."""
+    """Return A of the mean and of the differences along a chain, shape (n, n)."""
     rows = np.zeros((robots, robots))
     rows[0] = 1.0 / robots
     for i in range(robots - 1):
@@ -153,17 +153,17 @@ def _gains(
     between: tuple[tuple[float, float], tuple[float, float]],
     reaction: float,
 ) -> tuple[Array, Array]:
-    """K and D, shape (n,) each, which the age of the torque allows in free motion."""
+    """Return K and D, shape (n,) each, stable in free motion for the age of the torque."""
     n = len(inertia)
     own = np.diag(inertia)
     stiffness, damping = np.empty(n), np.empty(n)
     for part, limits in zip((slice(0, first), slice(first, n)), between, strict=True):
         ratio, mean = log_uniform(rng, *RATIO), float(own[part].mean())
-        # Damping has to exceed stiffness times the torque's age.
+        # Damping must exceed stiffness times the age of the torque.
         fastest = min(FASTEST, 2.0 * SAFE * ratio / reaction)
         stiffness[part] = min(log_uniform(rng, *limits), fastest**2 * mean)
         damping[part] = 2.0 * ratio * np.sqrt(stiffness[part] * own[part])
-    # Nor may damping reverse a velocity before it is seen to act.
+    # Damping must not reverse a velocity within the age of the torque.
     strongest = float(eigh(np.diag(damping), inertia, eigvals_only=True)[-1])
     share = min(1.0, SAFE / (strongest * reaction))
     return share**2 * stiffness, share * damping

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""`noninteract check gauntlet`: random passive environments against the laws, counted."""
+"""`noninteract check gauntlet`: stability of the laws with random passive environments."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -17,36 +17,36 @@ from noninteract_ros.validation.gauntlet.judge import STATES, Verdict, judge
 from noninteract_ros.validation.gauntlet.one_case import one_case
 from noninteract_ros.validation.gauntlet.settings import GUARANTEED, GauntletSettings
 
-ROUNDING = 1e-9  # of a residual, relative to the energy that a case begins with
-COUNTS = ("law", "cases", *STATES[1:], "let go")
-JUDGED = ("law", "by eigenvalue", "by simulation", "both agree", "too slow to tell", "disagree")
-ENERGY = ("law", "residual", "|r + L|", "plant's imbalance", "sampling, largest", "sampling, mean")
+ROUNDING = 1e-9  # of a residual, relative to the initial energy of a case
+COUNTS = ("law", "cases", *STATES[1:], "nu < 0.5")
+JUDGED = ("law", "by eigenvalue", "by simulation", "both agree", "undecided", "disagree")
+ENERGY = ("law", "residual", "|r + L|", "plant imbalance", "max sampling", "mean sampling")
 GATES = (
     "law",
     "mean sigma",
-    "least sigma",
+    "min sigma",
     "share with sigma = 1",
-    "closed in",
-    "least level [J]",
+    "cases with sigma < 1",
+    "min level [J]",
 )
 
 
 def check_gauntlet(settings: GauntletSettings) -> CheckReport:
-    """Run all cases under all laws and counts, or tells a single case in full."""
+    """Run all cases under all laws and count outcomes, or report a single case in detail."""
     if settings.only is not None:
         return one_case(settings, settings.only)
     return counted(settings, run_cases(settings))
 
 
 def counted(settings: GauntletSettings, verdicts: Sequence[Verdict]) -> CheckReport:
-    """Counts of all verdicts by law, and the claims of the laws that are passive."""
+    """Return counts of all verdicts by law, and checks of the passive laws."""
     by_law = {law: [item for item in verdicts if item.law == law] for law in settings.laws}
     named = [item for item in verdicts if not item.settled]
     checks = [check for law, own in by_law.items() for check in _claims(law, own, settings)]
     tables = (
         ("outcomes", COUNTS, _counts),
-        ("judged", JUDGED, _judged),
-        ("energy relative to the first one", ENERGY, _energy),
+        ("stability verdicts", JUDGED, _judged),
+        ("energy relative to the initial one", ENERGY, _energy),
         ("gates", GATES, _gates),
     )
     sections = [
@@ -65,12 +65,12 @@ def counted(settings: GauntletSettings, verdicts: Sequence[Verdict]) -> CheckRep
 
 
 def run_cases(settings: GauntletSettings) -> list[Verdict]:
-    """Verdicts on all cases, by case and law; compiled code runs on several threads at a time."""
+    """Return verdicts by case and law; compiled code runs in parallel threads."""
 
     def one(index: int) -> list[Verdict]:
         return judge(make_case(settings.seed, index, settings.reaction), settings)
 
-    verdicts = one(0)  # Compiles everything before threads wait for the compiler.
+    verdicts = one(0)  # Compile before starting the threads.
     indices = range(1, settings.cases)
     shown = Console(stderr=True)
     with ThreadPoolExecutor(settings.workers) as pool:
@@ -124,7 +124,7 @@ def _gates(law: str, own: Sequence[Verdict]) -> tuple[object, ...]:
 
 def _claims(law: str, own: Sequence[Verdict], settings: GauntletSettings) -> list[Check]:
     disagreed = sum(item.agreed is False for item in own)
-    checks = [at_most(f"verdicts that disagree, {law}", disagreed, 0, "cases")]
+    checks = [at_most(f"disagreeing verdicts, {law}", disagreed, 0, "cases")]
     if law not in GUARANTEED:
         return checks
     counts = dict(zip(COUNTS, _counts(law, own), strict=True))
@@ -132,13 +132,13 @@ def _claims(law: str, own: Sequence[Verdict], settings: GauntletSettings) -> lis
         checks.append(at_most(f"{name}, {law}", counts[name], 0, "cases"))
     name, largest = f"residual, {law}", max(item.residual for item in own)
     if settings.delay and settings.drop:
-        reason = "a torque that changes unseen while states are lost is booked to third order only"
+        reason = "with lost states, changes of the torque are accounted to third order only"
         return [*checks, not_applicable(name, ROUNDING, "relative", reason)]
     return [*checks, at_most(name, largest, ROUNDING, "relative")]
 
 
 def _not_at_rest(named: Sequence[Verdict]) -> Section:
-    """How many of each law and cause, and which."""
+    """Return counts and numbers of cases not at rest, by law and cause."""
     groups: dict[tuple[str, str], list[str]] = {}
     for item in named:
         groups.setdefault((item.law, item.cause), []).append(str(item.index))
@@ -147,7 +147,7 @@ def _not_at_rest(named: Sequence[Verdict]) -> Section:
 
 
 def _in_detail(settings: GauntletSettings, named: Sequence[Verdict]) -> Section:
-    """Each case that a passive law should have brought to rest."""
+    """Return details of the cases not at rest under passive laws."""
     rows = []
     for item in named:
         if item.law in GUARANTEED:
@@ -155,5 +155,5 @@ def _in_detail(settings: GauntletSettings, named: Sequence[Verdict]) -> Section:
             rate = "-" if item.growth is None else f"{item.growth:.3g}"
             numbers = item.time, item.speed, item.sigma, item.grip
             rows.append((str(item.index), item.law, case.kind, item.cause, rate, *numbers))
-    columns = ("case", "law", "what", "cause", "frozen loop [1/s]", "time [s]", "speed", "σ", "ν")
-    return Section("passive laws that are not at rest", columns, tuple(rows))
+    columns = ("case", "law", "kind", "cause", "growth rate [1/s]", "time [s]", "speed", "σ", "ν")
+    return Section("passive laws not at rest", columns, tuple(rows))

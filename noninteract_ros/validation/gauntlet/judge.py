@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verdicts: a case under a law, by eigenvalues where its loop is linear, by simulation always."""
+"""Stability verdict on a case under a law, by simulation and by eigenvalues of linear loops."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,29 +17,29 @@ from noninteract_ros.validation.gauntlet.settings import LAWS, GauntletSettings
 from noninteract_ros.validation.gauntlet.simulation import run
 
 STATES = ("at rest", "unbounded", "not at rest", "out of reach")  # by the compiled verdict
-LEAST = 4.0  # [s] that every case runs
+LEAST = 4.0  # [s] shortest duration of a case
 WINDOW = 0.5  # [s]
-QUIET = 1e-3  # speed relative to its peak that counts as rest
-VERY_QUIET = 1e-9  # the same where eigenvalues say that rest cannot last
-GROWTH = 100.0  # energy relative to the first one that counts as unbounded
-NEUTRAL = 1e-3  # [1/s] growth that counts as none: a line of equilibria, robots that let go
-LETTING_GO = 0.5  # nu below which the impedance counts as having yielded
+QUIET = 1e-3  # speed at rest relative to its peak
+VERY_QUIET = 1e-9  # the same for loops with unstable eigenvalues
+GROWTH = 100.0  # unbounded energy relative to the initial one
+NEUTRAL = 1e-3  # [1/s] growth rate of a continuum of equilibria, or of a closed impedance gate
+YIELDED = 0.5  # nu below which the impedance counts as yielded
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a case under a law; energies relative to the one that it began with.
+    """Outcome of a case under a law; energies are relative to the initial energy.
 
     Attributes:
         index: Number of the case.
         law: The law.
         state: One of `STATES`.
-        time: How long it ran [s].
+        time: Duration of the simulation [s].
         speed: Largest speed of the last window relative to the peak.
-        slowing: Largest speed of the last window relative to the one before.
+        slowing: Largest speed of the last window relative to the window before.
         growth: Growth rate of the linear loop [1/s], with the final gates for the gated law;
-            None where the case is not linear.
-        agreed: Whether simulation and eigenvalue say the same; None where one says nothing.
+            None for nonlinear cases.
+        agreed: True if simulation and eigenvalue agree; None if either is undecided.
         sigma_mean: Mean of sigma.
         sigma_least: Smallest sigma.
         sigma_full: Share of time with sigma = 1.
@@ -47,11 +47,11 @@ class Verdict:
         grip: Last nu.
         grip_least: Smallest nu.
         level_least: Smallest level of the tank [J].
-        residual: Largest r = W - W(0) - supplied energy, less what the plant itself gained.
-        mismatch: Largest |r + L|, less the same.
-        imbalance: What the plant itself gained or lost.
+        residual: Largest r = W - W(0) - supplied energy, less the imbalance.
+        mismatch: Largest |r + L|, less the imbalance.
+        imbalance: Energy error of the integration of the plant.
         sampling: Largest error of an account with power times time instead of measured work.
-        cause: Why it is not at rest, or an empty text.
+        cause: Cause of motion at the end, or an empty text.
     """
 
     index: int
@@ -77,24 +77,24 @@ class Verdict:
 
     @property
     def settled(self) -> bool:
-        """Whether it came to rest."""
+        """True if the case came to rest."""
         return self.state == STATES[state.SETTLED]
 
     @property
     def yields(self) -> bool:
-        """Whether the impedance has let go."""
-        return self.grip < LETTING_GO
+        """True if the impedance gate is nearly closed."""
+        return self.grip < YIELDED
 
     @property
     def unstable(self) -> bool:
-        """Whether eigenvalue or simulation says that it grows without bound."""
+        """True if eigenvalue or simulation shows unbounded growth."""
         if self.law != "energy_gated" and self.growth is not None and self.growth > NEUTRAL:
             return True
         return self.state == STATES[state.UNBOUNDED]
 
 
 def judge(case: Case, settings: GauntletSettings) -> list[Verdict]:
-    """A verdict for each law."""
+    """Return a verdict for each law."""
     plant = plant_of(case, settings.period)
     verdicts = [_verdict(case, plant, law, settings) for law in settings.laws]
     unsettled = [item.law for item in verdicts if not item.settled]
@@ -108,7 +108,7 @@ def judge(case: Case, settings: GauntletSettings) -> list[Verdict]:
 
 
 def trace(case: Case, law: str, settings: GauntletSettings, rows: int, stride: int) -> Array:
-    """A run of a case, every `stride` ticks; columns of `state.record`."""
+    """Return a run of a case, every `stride` ticks; columns of `simulation.record`."""
     table = np.full((rows, state.TRACED + 2 * case.start.shape[1] + case.team.n), np.nan)
     seconds = rows * stride * settings.period
     limits = _limits(settings, seconds, least=seconds)
@@ -120,7 +120,7 @@ def _verdict(case: Case, plant: PlantArrays, law: str, settings: GauntletSetting
     linear = case.linear and settings.drop == 0.0
     found = _judged(case, plant, law, settings, _limits(settings, settings.horizon), linear)
     if linear and found.settled and found.growth is not None and found.growth > NEUTRAL:
-        # Quiet it is, but what grows may only have begun small.
+        # Slow growth may not be visible yet: continue to a lower speed.
         patient = _limits(settings, settings.horizon, quiet=VERY_QUIET)
         return _judged(case, plant, law, settings, patient, linear)
     return found
@@ -205,10 +205,10 @@ def _judged(
 
 
 def _agreed(ended: int, growth: float | None, law: str, time: float) -> bool | None:
-    """Whether the eigenvalue says what the simulation shows; None where one is silent.
+    """Return True if eigenvalue and simulation agree; None if either is undecided.
 
-    A loop too slow to come to rest, or to leave, within the time is one that simulation does not
-    decide. The eigenvalue of a gated loop is that of its last gates and decides about rest alone.
+    The simulation does not decide loops too slow to settle or to diverge within its duration. The
+    eigenvalue of a gated loop uses the final gates and decides only whether it comes to rest.
     """
     if growth is None or ended == state.ESCAPED:
         return None
@@ -221,13 +221,13 @@ def _agreed(ended: int, growth: float | None, law: str, time: float) -> bool | N
 
 
 def _cause(found: Verdict, natural: Verdict) -> str:
-    """Why a case is not at rest, in the order of what explains most."""
+    """Return the most likely cause why a case is not at rest."""
     if found.unstable and found.law not in ("natural", "energy_gated"):
         return "the law"
     if natural.unstable or natural.state == STATES[state.UNBOUNDED]:
         return "the natural law is unstable"
     if found.yields:
-        return "let go"
+        return "impedance gate closed"
     if found.slowing < 1.0 or (found.growth is not None and found.growth < -1e-6):
         return "still decaying"
     return "sustained"

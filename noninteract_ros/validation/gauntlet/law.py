@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The laws in compiled form, for references at rest; proved equal to the product's by tests.
+"""The laws in compiled form for references at rest; tests compare them with the controller.
 
 Torque of all laws: J' (F_n + sigma F_a) + g with F_n = -nu (D de/dt + K e) and F_a the force of
 complete decoupling beyond the natural law, Lambda (a_non - a_nat).
@@ -36,7 +36,7 @@ KINETIC, LIFTED = 0, 1  # places in `energies`
 
 
 class Terms(NamedTuple):
-    """A team at a state; its arrays are written anew at every tick.
+    """Terms of a team at a state; overwritten at every tick.
 
     Attributes:
         e: Error x - x_d, shape (n,).
@@ -46,10 +46,10 @@ class Terms(NamedTuple):
         inverse: Lambda^-1, shape (n, n).
         mixed: Lambda blkdiag(M_i)^-1, shape (n, n).
         coriolis: mu, shape (n, n).
-        gravity: Torque of the weights, shape (n,).
-        energies: Kinetic energy and potential energy of the weights [J].
+        gravity: Gravity torque, shape (n,).
+        energies: Kinetic energy and gravitational energy [J].
         tools: Tool Jacobian, inertia and Coriolis matrix at the tools, shape (3, n, n).
-        spare: Room, shape (4, n).
+        spare: Work space, shape (4, n).
     """
 
     e: Array
@@ -66,7 +66,7 @@ class Terms(NamedTuple):
 
 
 def new_terms(team: TeamArrays) -> Terms:
-    """Terms with all that a team of point masses never changes."""
+    """Allocate terms, with the constant terms of point masses."""
     n = team.n
     inertia = team.S.T @ np.diag(team.masses) @ team.S
     inverse, mixed = np.zeros((n, n)), np.zeros((n, n))
@@ -105,7 +105,7 @@ def observe(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
 
 @compiled
 def arms_at(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
-    """Planar arms: seen from their tools they are masses that change as they turn."""
+    """Write the terms of planar arms, with their inertia at the tools."""
     at_tools(team, terms, q, v)
     tool_jacobian, inertia, lightness, coriolis = terms.tools
     multiply(team.mixing, terms.spare[0], terms.e)
@@ -131,7 +131,7 @@ def arms_at(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
 
 @compiled
 def at_tools(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
-    """Write tool matrices, tool coordinates (into spare), weights and energies of arms."""
+    """Write tool matrices, tool coordinates (into spare), gravity and energies of arms."""
     terms.energies[KINETIC] = terms.energies[LIFTED] = 0.0
     for i in range(len(team.arms)):
         at = 2 * i
@@ -166,8 +166,8 @@ def complete_force(team: TeamArrays, terms: Terms, paper: bool, pull: Array, for
 
     Args:
         team: The robots.
-        terms: Where they are.
-        paper: Whether to keep the paper's C_s,ii instead of C~_i.
+        terms: Terms of the state.
+        paper: True to keep the paper's C_s,ii instead of C~_i.
         pull: F_n, shape (n,).
         force: Result, shape (n,).
     """
@@ -197,7 +197,7 @@ def complete_force(team: TeamArrays, terms: Terms, paper: bool, pull: Array, for
 
 @compiled
 def potential(team: TeamArrays, terms: Terms) -> float:
-    """U(e) of linear springs [J]."""
+    """Return U(e) of linear springs [J]."""
     total = 0.0
     for i in range(team.n):
         total += 0.5 * team.stiffness[i] * terms.e[i] ** 2
@@ -206,7 +206,7 @@ def potential(team: TeamArrays, terms: Terms) -> float:
 
 @compiled
 def storage(team: TeamArrays, terms: Terms) -> float:
-    """V_s, sum of the subtasks' storage functions [J]."""
+    """Return V_s, the sum of the subtasks' storage functions [J]."""
     coupled = 0.0
     for i in range(team.first):
         for j in range(team.first, team.n):
@@ -217,5 +217,5 @@ def storage(team: TeamArrays, terms: Terms) -> float:
 
 @compiled
 def power(team: TeamArrays, terms: Terms, force: Array) -> float:
-    """Power of a task force [W]."""
+    """Return the power of a task force [W]."""
     return dot(terms.e_rate, force, team.n)

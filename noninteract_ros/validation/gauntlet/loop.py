@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The linear loop of a case: what holds over a tick exactly, and the eigenvalues of ticks."""
+"""Linear sampled loop of a case: exact transition over a tick, and its eigenvalues."""
 
 import numpy as np
 from scipy.linalg import expm
@@ -12,7 +12,7 @@ SUBSTEPS = 4  # of a tick at 1 kHz; more at lower rates, so that the plant stays
 
 
 def plant_of(case: Case, period: float) -> PlantArrays:
-    """What moves between two ticks."""
+    """Create the plant between two ticks."""
     m, n = case.start.shape[1], case.team.n
     inertia = case.around.inertia.copy()
     inertia[:n, :n] += np.diag(case.team.masses)
@@ -35,10 +35,10 @@ def plant_of(case: Case, period: float) -> PlantArrays:
 
 
 def held(case: Case, inertia: Array, period: float) -> tuple[Array, Array]:
-    """Transition (z, dz/dt) over a tick and its heat, both on w = (z, dz/dt, torque, 1).
+    """Return transition of (z, dz/dt) over a tick and heat, both for w = (z, dz/dt, torque, 1).
 
-    The heat is the integral of Phi' C Phi, by Van Loan's block exponential; velocities are scaled
-    by the period, so that the exponential sees numbers of like size.
+    The heat is the integral of Phi' C Phi, by Van Loan's block exponential. Velocities are scaled
+    by the period for entries of similar magnitude.
     """
     around, n = case.around, case.team.n
     m = len(around.rest)
@@ -61,10 +61,9 @@ def held(case: Case, inertia: Array, period: float) -> tuple[Array, Array]:
 
 
 def growth_rate(case: Case, period: float, delay: int, sigma: float, grip: float) -> float:
-    """Largest growth rate of the sampled loop with constant gates [1/s].
+    """Return the largest growth rate of the sampled loop with constant gates [1/s].
 
-    The monodromy matrix acts on the plant's state and on the torques still under way. A body that
-    nothing touches is left out.
+    The monodromy matrix acts on the state of the plant and on the delayed torques.
 
     Args:
         case: A linear case.
@@ -96,7 +95,7 @@ def growth_rate(case: Case, period: float, delay: int, sigma: float, grip: float
 
 
 def _shaping(case: Case, sigma: float) -> Array:
-    """I + sigma (Lambda blkdiag(M_i)^-1 - I), shape (n, n)."""
+    """Return I + sigma (Lambda blkdiag(M_i)^-1 - I), shape (n, n)."""
     S, n, first = case.team.S, case.team.n, case.team.first
     inertia = S.T @ np.diag(case.team.masses) @ S
     own = inertia.copy()

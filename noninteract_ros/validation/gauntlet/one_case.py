@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A single case of the gauntlet, told in full, so that a failure can be looked at."""
+"""Detailed report of a single case of the gauntlet."""
 
 from typing import Any
 
@@ -15,12 +15,12 @@ SECONDS = 30.0  # of the trace, at most
 
 
 def one_case(settings: GauntletSettings, index: int) -> CheckReport:
-    """Robots, gains, surroundings, what each law makes of it, and the last law's course."""
+    """Report robots, gains, environment, outcome of each law and the time course of the last."""
     case = make_case(settings.seed, index, settings.reaction)
     verdicts = judge(case, settings)
     sections = (
-        Section("robots and gains", ("what", "values"), _team_rows(case)),
-        Section("surroundings", ("element",), tuple((item.text(),) for item in case.elements)),
+        Section("robots and gains", ("quantity", "values"), _team_rows(case)),
+        Section("environment", ("element",), tuple((item.text(),) for item in case.elements)),
         Section("outcomes", OUTCOMES, tuple(_outcome(item) for item in verdicts)),
         _course(case, settings, verdicts[-1]),
     )
@@ -28,7 +28,7 @@ def one_case(settings: GauntletSettings, index: int) -> CheckReport:
     return CheckReport(target, sections, (), ())
 
 
-OUTCOMES = ("law", "ends", "cause", "time [s]", "growth [1/s]", "mean σ", "σ", "ν", "residual")
+OUTCOMES = ("law", "state", "cause", "time [s]", "growth [1/s]", "mean σ", "σ", "ν", "residual")
 
 
 def _outcome(item: Verdict) -> tuple[Any, ...]:
@@ -53,12 +53,24 @@ def _team_rows(case: Case) -> tuple[tuple[str, str], ...]:
 
 
 def _course(case: Case, settings: GauntletSettings, verdict: Verdict) -> Section:
-    """Account and energies over time."""
+    """Return account and energies over time."""
     seconds = min(verdict.time, SECONDS)
     stride = max(1, round(seconds * settings.rate / ROWS))
     table = trace(case, verdict.law, settings, ROWS, stride)
-    t, sigma, grip, level, reserve, lost, potential, kinetic, outside, residual = table[:, :10].T
-    columns = (t, sigma, grip, level, reserve, lost, grip * potential + kinetic, outside, residual)
-    names = ("t [s]", "σ", "ν", "tank [J]", "reserve [J]", "L [J]", "V [J]", "around [J]", "r [J]")
+    t, sigma, grip, level, reserve, lost, potential, kinetic, environment, residual = table[
+        :, :10
+    ].T
+    columns = (
+        t,
+        sigma,
+        grip,
+        level,
+        reserve,
+        lost,
+        grip * potential + kinetic,
+        environment,
+        residual,
+    )
+    names = ("t [s]", "σ", "ν", "tank [J]", "reserve [J]", "L [J]", "V [J]", "env. [J]", "r [J]")
     rows = tuple(tuple(float(value) for value in row) for row in np.array(columns).T)
-    return Section(f"course under {verdict.law}", names, rows)
+    return Section(f"time course under {verdict.law}", names, rows)

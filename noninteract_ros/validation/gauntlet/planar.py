@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed-form dynamics of planar arms of two rods, compiled; arm i turns joints 2 i and 2 i + 1.
+"""Closed-form dynamics of planar two-link arms, compiled; arm i has joints 2 i and 2 i + 1.
 
 M = [[alpha + 2 beta c, delta + beta c], [., delta]], c = cos q_2, C from Christoffel's symbols,
 potential energy gamma_1 sin q_1 + gamma_2 sin(q_1 + q_2); `TeamArrays.arms` holds the parameters.
@@ -13,7 +13,7 @@ from noninteract_ros.validation.gauntlet.arrays import Block, compiled
 
 @compiled
 def arm_inertia(arms: Array, i: int, q: Array) -> Block:
-    """M."""
+    """Return M."""
     bent = arms[i, 3] * np.cos(q[2 * i + 1])
     mixed = arms[i, 4] + bent
     return (arms[i, 2] + 2.0 * bent, mixed, mixed, arms[i, 4])
@@ -21,7 +21,7 @@ def arm_inertia(arms: Array, i: int, q: Array) -> Block:
 
 @compiled
 def arm_coriolis(arms: Array, i: int, q: Array, v: Array) -> Block:
-    """C."""
+    """Return C."""
     turning = arms[i, 3] * np.sin(q[2 * i + 1])
     both = v[2 * i] + v[2 * i + 1]
     return (-turning * v[2 * i + 1], -turning * both, turning * v[2 * i], 0.0)
@@ -29,20 +29,20 @@ def arm_coriolis(arms: Array, i: int, q: Array, v: Array) -> Block:
 
 @compiled
 def arm_gravity(arms: Array, i: int, q: Array) -> tuple[float, float]:
-    """Torque of the weights."""
+    """Return the gravity torque [N m]."""
     outer = arms[i, 6] * np.cos(q[2 * i] + q[2 * i + 1])
     return (arms[i, 5] * np.cos(q[2 * i]) + outer, outer)
 
 
 @compiled
 def arm_lifted(arms: Array, i: int, q: Array) -> float:
-    """Potential energy of the weights [J]."""
+    """Return the gravitational energy [J]."""
     return float(arms[i, 5] * np.sin(q[2 * i]) + arms[i, 6] * np.sin(q[2 * i] + q[2 * i + 1]))
 
 
 @compiled
 def arm_tool(arms: Array, i: int, q: Array) -> tuple[float, float]:
-    """Tool point from the base [m]."""
+    """Return the tool point in the base frame [m]."""
     a, b = q[2 * i], q[2 * i] + q[2 * i + 1]
     l1, l2 = arms[i, 0], arms[i, 1]
     return (l1 * np.cos(a) + l2 * np.cos(b), l1 * np.sin(a) + l2 * np.sin(b))
@@ -50,7 +50,7 @@ def arm_tool(arms: Array, i: int, q: Array) -> tuple[float, float]:
 
 @compiled
 def arm_jacobian(arms: Array, i: int, q: Array) -> Block:
-    """Jacobian of the tool point."""
+    """Return the Jacobian of the tool point."""
     a, b = q[2 * i], q[2 * i] + q[2 * i + 1]
     l1, l2 = arms[i, 0], arms[i, 1]
     x, y = -l2 * np.sin(b), l2 * np.cos(b)
@@ -59,7 +59,7 @@ def arm_jacobian(arms: Array, i: int, q: Array) -> Block:
 
 @compiled
 def arm_jacobian_rate(arms: Array, i: int, q: Array, v: Array) -> Block:
-    """Its rate."""
+    """Return the time derivative of the Jacobian."""
     a, b = q[2 * i], q[2 * i] + q[2 * i + 1]
     near, far = arms[i, 0] * v[2 * i], arms[i, 1] * (v[2 * i] + v[2 * i + 1])
     x, y = -far * np.cos(b), -far * np.sin(b)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What moves under a held torque, in compiled form; each plant accounts for its own losses.
+"""Plants with a zero-order hold of the torque, in compiled form, with their dissipated energy.
 
-Three plants: the exact zero-order hold of a linear one; an implicit midpoint rule whose contact
-forces are discrete gradients, which keeps energy to rounding; and Runge-Kutta for planar arms,
-whose imbalance of energy is measured at every tick.
+Linear plants use the exact discretization. Plants with contacts use an implicit midpoint rule with
+discrete gradients of the contact forces, which conserves energy to rounding. Planar arms use
+Runge-Kutta; their energy error is measured at every tick.
 """
 
 from typing import NamedTuple
@@ -35,24 +35,24 @@ from noninteract_ros.validation.gauntlet.planar import (
 )
 
 LINEAR, CONTACT, ARMS = 0, 1, 2  # kinds of plants
-ROUNDS = 8  # of the fixed point of contact forces; each gains three digits and more
+ROUNDS = 8  # fixed-point iterations of contact forces; each gains three digits or more
 STAGES = np.array([[0.0, 1.0], [0.5, 2.0], [0.5, 2.0], [1.0, 1.0]])  # of Runge and Kutta
 
 
 class PlantArrays(NamedTuple):
-    """Matrices that a tick needs; m coordinates z, w = (z, dz/dt, torque, 1).
+    """Matrices of one tick; m coordinates z, w = (z, dz/dt, torque, 1).
 
     Attributes:
         kind: LINEAR, CONTACT or ARMS.
-        substeps: Integration steps in a tick, of those that are not exact.
+        substeps: Integration steps per tick of inexact plants.
         tick: w -> (z, dz/dt) a tick later, shape (2 m, 2 m + n + 1).
         loss: Heat of a tick as a quadratic form of w.
         response: Midpoint velocity by impulse over a substep, shape (m, m).
         inertia: Robots, carried masses and bodies, shape (m, m); of arms without the arms.
-        room: Room for vectors, shape (m,) each.
-        long: Room for w and for its image.
-        square: Room for matrices, shape (m, m) each.
-        contacts: Room for force and depth of each contact.
+        room: Work space for vectors, shape (m,) each.
+        long: Work space for w and its image.
+        square: Work space for matrices, shape (m, m) each.
+        contacts: Work space for force and depth of each contact.
     """
 
     kind: int
@@ -69,7 +69,7 @@ class PlantArrays(NamedTuple):
 
 @compiled
 def linear_tick(plant: PlantArrays, z: Array, z_rate: Array, torque: Array) -> float:
-    """One tick of a linear plant in place; returns its heat [J]."""
+    """Advance a linear plant by one tick in place; return the heat [J]."""
     m, n = len(z), len(torque)
     w, after = plant.long
     for i in range(m):
@@ -85,7 +85,7 @@ def linear_tick(plant: PlantArrays, z: Array, z_rate: Array, torque: Array) -> f
 
 @compiled
 def contact_force(stiffness: float, before: float, way: float) -> float:
-    """Force of a contact over a way that gives exactly the change of its energy [N]."""
+    """Return the mean contact force over a step: change of energy per distance [N]."""
     deep, deeper = max(before, 0.0), max(before + way, 0.0)
     if abs(way) < 1e-13:
         return -stiffness * deep
@@ -101,7 +101,7 @@ def contact_tick(
     z_rate: Array,
     torque: Array,
 ) -> float:
-    """One tick of a plant with one-sided contacts in place; returns its heat [J]."""
+    """Advance a plant with unilateral contacts by one tick in place; return the heat [J]."""
     h, heat, m, n = T / plant.substeps, 0.0, len(z), len(torque)
     push, load, middle, spring = plant.room[0], plant.room[1], plant.room[2], plant.room[3]
     forces, depth = plant.contacts
@@ -131,7 +131,7 @@ def contact_tick(
 
 @compiled
 def touching(around: SurroundingsArrays, z: Array, force: Array) -> float:
-    """force = that of springs and contacts, shape (m,); returns their energy [J]."""
+    """Write the force of springs and contacts, shape (m,); return their energy [J]."""
     multiply(around.stiffness, z, force)
     energy = around.preload
     for i in range(len(force)):
@@ -175,7 +175,7 @@ def arms_acceleration(
     torque: Array,
     acceleration: Array,
 ) -> float:
-    """Write the acceleration of joints and bodies; returns the heat's power [W]."""
+    """Write the acceleration of joints and bodies; return the dissipated power [W]."""
     z, z_rate, bias, force = plant.room[0], plant.room[1], plant.room[2], plant.room[3]
     J, M = plant.square
     tool_motion(team, q, v, z, z_rate, J, bias)
@@ -208,7 +208,7 @@ def arms_tick(
     v: Array,
     torque: Array,
 ) -> float:
-    """One tick of planar arms in place, classical Runge-Kutta; returns its heat [J]."""
+    """Advance planar arms by one tick in place (classical Runge-Kutta); return the heat [J]."""
     h, heat, m = T / plant.substeps, 0.0, len(q)
     at, rate, slope = plant.room[4], plant.room[5], plant.room[6]
     q_sum, v_sum = plant.long
@@ -239,7 +239,7 @@ def advance(
     v: Array,
     torque: Array,
 ) -> float:
-    """One tick in place; returns its heat [J]."""
+    """Advance a plant by one tick in place; return the heat [J]."""
     if plant.kind == LINEAR:
         return linear_tick(plant, q, v, torque)
     if plant.kind == CONTACT:
@@ -248,10 +248,10 @@ def advance(
 
 
 @compiled
-def outside_energy(
+def environment_energy(
     plant: PlantArrays, team: TeamArrays, around: SurroundingsArrays, q: Array, v: Array
 ) -> tuple[float, float]:
-    """Potential and kinetic energy of everything that is not a robot [J]."""
+    """Return potential and kinetic energy of the environment [J]."""
     z, z_rate = plant.room[0], plant.room[1]
     if plant.kind == ARMS:
         tool_motion(team, q, v, z, z_rate, plant.square[0], plant.room[2])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a user can choose of a gauntlet."""
+"""Settings of the gauntlet."""
 
 import os
 from dataclasses import dataclass, field
@@ -9,23 +9,23 @@ from noninteract_ros.errors import ScenarioError, one_of
 
 # In the order of the compiled law's numbers.
 LAWS = ("natural", "noninteracting", "paper", "energy_gated")
-GUARANTEED = ("natural", "energy_gated")  # laws that claim to be passive where they are touched
+GUARANTEED = ("natural", "energy_gated")  # laws that are passive at the external port
 
 
 @dataclass(frozen=True)
 class GauntletSettings:
-    """Which cases, which laws, and what lies between states and torques.
+    """Cases, laws and link of a gauntlet.
 
     Attributes:
         cases: Number of cases.
         seed: Seed of all of them.
-        laws: Laws to be judged.
-        delay: Ticks between a state and the torque that answers it.
-        drop: Share of the states that do not arrive.
-        rate: Ticks per second [Hz].
-        horizon: How long a case may take to come to rest [s].
-        jobs: Cases that run at a time; 0: one per processor.
-        only: Number of a single case to be told in full, or None.
+        laws: Laws to test.
+        delay: Delay from a state to its torque [ticks].
+        drop: Share of lost states.
+        rate: Control rate [Hz].
+        horizon: Largest duration of a case [s].
+        jobs: Number of parallel cases; 0 for one per processor.
+        only: Number of a single case to report in detail, or None.
         tank: Settings of the account.
     """
 
@@ -53,15 +53,15 @@ class GauntletSettings:
 
     @property
     def period(self) -> float:
-        """Time from tick to tick [s]."""
+        """Control period [s]."""
         return 1.0 / self.rate
 
     @property
     def reaction(self) -> float:
-        """Mean age of the torque that acts: half a tick and the delay [s]."""
+        """Mean age of the applied torque: half a tick plus the delay [s]."""
         return (self.delay + 0.5) * self.period
 
     @property
     def workers(self) -> int:
-        """Cases that run at a time."""
+        """Number of parallel cases."""
         return self.jobs or os.cpu_count() or 1

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sampled loop of one case in compiled form: law, account, delay, lost states and plant."""
+"""Sampled loop of one case in compiled form: law, account, delay, lost states and plant."""
 
 from typing import Any
 
@@ -10,9 +10,9 @@ from noninteract_ros.validation.gauntlet.accounting import (
     book,
     full_tank,
     gates_of,
-    see,
+    store_state,
     stored,
-    weigh,
+    update_residual,
 )
 from noninteract_ros.validation.gauntlet.arrays import (
     SurroundingsArrays,
@@ -31,7 +31,7 @@ from noninteract_ros.validation.gauntlet.law import (
     observe,
     potential,
 )
-from noninteract_ros.validation.gauntlet.plant import PlantArrays, advance, outside_energy
+from noninteract_ros.validation.gauntlet.plant import PlantArrays, advance, environment_energy
 from noninteract_ros.validation.gauntlet.state import (
     ESCAPED,
     NATURAL,
@@ -52,7 +52,7 @@ from noninteract_ros.validation.gauntlet.state import (
 def command(
     team: TeamArrays, terms: Terms, law: int, memory: Memory, tank: Any, to: Array
 ) -> None:
-    """Write the torques of impedance (with gravity's) and decoupling, shape (2, n)."""
+    """Write the torques of impedance plus gravity and of decoupling, shape (2, n)."""
     pull, beyond = memory.force
     impedance_force(team, terms, tank.grip, pull)
     multiply_transposed(terms.J, pull, to[0])
@@ -65,8 +65,8 @@ def command(
 
 
 @compiled
-def note(meter: Meter, tank: Any, speed: float) -> None:
-    """Statistics of a tick."""
+def update_meter(meter: Meter, tank: Any, speed: float) -> None:
+    """Update the statistics of a tick."""
     meter.peak[0], meter.last[0] = max(meter.peak[0], speed), max(meter.last[0], speed)
     meter.sums[0] += tank.sigma
     meter.sums[1] += 1.0 if tank.sigma >= 1.0 else 0.0
@@ -80,16 +80,16 @@ def note(meter: Meter, tank: Any, speed: float) -> None:
 def verdict_of(
     team: TeamArrays, terms: Terms, memory: Memory, k: int, limits: Limits, meter: Meter
 ) -> int:
-    """What can be said after k ticks; UNSETTLED while nothing can."""
-    now = terms.energies[KINETIC] + memory.outside[0] + memory.outside[1]
+    """Return the state of the case after k ticks; UNSETTLED while undecided."""
+    now = terms.energies[KINETIC] + memory.environment[0] + memory.environment[1]
     if not now <= limits.growth * (memory.began[0] + memory.began[1]):
         return UNBOUNDED
     for i in range(len(team.arms)):
         if abs(np.sin(memory.q[2 * i + 1])) < STRETCHED:
             return ESCAPED
     if k % limits.window == limits.window - 1:
-        loud = max(meter.last[0], meter.before[0])
-        if k >= limits.least and loud <= limits.quiet * meter.peak[0]:
+        fastest = max(meter.last[0], meter.before[0])
+        if k >= limits.least and fastest <= limits.quiet * meter.peak[0]:
             return SETTLED
         if k < limits.most - 1:
             meter.before[0], meter.last[0] = meter.last[0], 0.0
@@ -106,19 +106,27 @@ def move(
     memory: Memory,
     meter: Meter,
 ) -> None:
-    """One tick of the plant, its heat and its own imbalance of energy."""
+    """Advance the plant by one tick, with its heat and energy error."""
     n = team.n
     before = (
-        terms.energies[KINETIC] + terms.energies[LIFTED] + memory.outside[0] + memory.outside[1]
+        terms.energies[KINETIC]
+        + terms.energies[LIFTED]
+        + memory.environment[0]
+        + memory.environment[1]
     )
     work = -dot(memory.torque, memory.q, n)
     lost = advance(plant, team, around, T, memory.q, memory.v, memory.torque)
     work += dot(memory.torque, memory.q, n)
     memory.heat[0] += lost
     observe(team, terms, memory.q, memory.v)
-    memory.outside[0], memory.outside[1] = outside_energy(plant, team, around, memory.q, memory.v)
+    memory.environment[0], memory.environment[1] = environment_energy(
+        plant, team, around, memory.q, memory.v
+    )
     after = (
-        terms.energies[KINETIC] + terms.energies[LIFTED] + memory.outside[0] + memory.outside[1]
+        terms.energies[KINETIC]
+        + terms.energies[LIFTED]
+        + memory.environment[0]
+        + memory.environment[1]
     )
     meter.imbalance[0] += abs(after - before + lost - work)
 
@@ -128,7 +136,7 @@ def record(row: Array, t: float, tank: Any, terms: Terms, memory: Memory, meter:
     """Write a row of a trace: time, gates, account, energies, residual, q, v, torque."""
     row[0], row[1], row[2], row[3], row[4] = t, tank.sigma, tank.grip, tank.level, tank.reserve
     row[5], row[6], row[7] = tank.lost, tank.potential, terms.energies[KINETIC]
-    row[8], row[9] = memory.outside[0] + memory.outside[1], meter.now[0]
+    row[8], row[9] = memory.environment[0] + memory.environment[1], meter.now[0]
     m, n = len(memory.q), len(memory.torque)
     for i in range(m):
         row[TRACED + i], row[TRACED + m + i] = memory.q[i], memory.v[i]
@@ -146,15 +154,17 @@ def begin(
     memory: Memory,
     settings: Any,
 ) -> Any:
-    """The account at the start, and the first memories."""
+    """Return the initial account and initialize the memory."""
     observe(team, terms, memory.q, memory.v)
     tank = gates_of(law, full_tank(settings, potential(team, terms)))
-    memory.outside[0], memory.outside[1] = outside_energy(plant, team, around, memory.q, memory.v)
+    memory.environment[0], memory.environment[1] = environment_energy(
+        plant, team, around, memory.q, memory.v
+    )
     memory.began[0] = stored(terms, tank)
-    memory.began[1] = memory.outside[0] + memory.outside[1]
+    memory.began[1] = memory.environment[0] + memory.environment[1]
     for slot in range(len(memory.pending)):
         copy(terms.gravity, memory.pending[slot, 0])
-    see(team, terms, memory, 0.0)
+    store_state(team, terms, memory, 0.0)
     return tank
 
 
@@ -174,25 +184,25 @@ def run(
     trace: Array,
     stride: int,
 ) -> tuple[int, int, Any]:
-    """Run one case until it is at rest, grows without bound or its time is over.
+    """Run one case until it is at rest, grows without bound or reaches the time limit.
 
     Args:
         team: The robots.
-        around: What they touch.
-        plant: How both move.
-        terms: Of `law.new_terms`.
+        around: Environment.
+        plant: Dynamics of robots and environment.
+        terms: Terms of `law.new_terms`.
         law: NATURAL, NONINTERACTING, PAPER or GATED.
-        settings: Of the account.
-        withheld: The same without refilling, for torques that nobody has commanded yet.
-        link: Between states and torques.
-        limits: When to stop.
-        memory: Of `new_memory`.
-        meter: Of `new_meter`.
+        settings: Settings of the account.
+        withheld: The same without refilling, for the torques before the first command.
+        link: Delay and losses between states and torques.
+        limits: Limits of the simulation.
+        memory: Memory of `new_memory`.
+        meter: Meter of `new_meter`.
         trace: Rows to fill, shape (rows, TRACED + 2 m + n).
         stride: Ticks from row to row.
 
     Returns:
-        SETTLED, UNBOUNDED, UNSETTLED or ESCAPED, the ticks it took, and the account.
+        SETTLED, UNBOUNDED, UNSETTLED or ESCAPED, the number of ticks, and the account.
     """
     np.random.seed(link.seed)
     slots = link.delay + 1
@@ -204,16 +214,16 @@ def run(
                 applied = memory.pending[last]
                 chosen = settings if k > link.delay else withheld
                 tank = book(team, terms, law, memory, applied, now, tank, chosen, meter)
-                weigh(terms, memory, tank, meter)
-                see(team, terms, memory, now)
+                update_residual(terms, memory, tank, meter)
+                store_state(team, terms, memory, now)
             command(team, terms, law, memory, tank, memory.pending[newest])
-        elif link.delay:  # The last command goes out once more.
+        elif link.delay:  # Repeat the last command.
             before = (newest + slots - 1) % slots
             copy(memory.pending[before, 0], memory.pending[newest, 0])
             copy(memory.pending[before, 1], memory.pending[newest, 1])
         for i in range(team.n):
             memory.torque[i] = memory.pending[k % slots, 0, i] + memory.pending[k % slots, 1, i]
-        note(meter, tank, np.sqrt(2.0 * (terms.energies[KINETIC] + memory.outside[1])))
+        update_meter(meter, tank, np.sqrt(2.0 * (terms.energies[KINETIC] + memory.environment[1])))
         if k % stride == 0 and k // stride < len(trace):
             record(trace[k // stride], now, tank, terms, memory, meter)
         verdict = verdict_of(team, terms, memory, k, limits, meter)

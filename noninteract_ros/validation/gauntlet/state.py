@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the loop of a case remembers and measures, and the numbers that compiled code goes by."""
+"""Memory, measurements and constants of the loop of a case."""
 
 from typing import NamedTuple
 
@@ -9,18 +9,18 @@ from noninteract_ros.arrays import Array
 
 NATURAL, NONINTERACTING, PAPER, GATED = 0, 1, 2, 3
 SETTLED, UNBOUNDED, UNSETTLED, ESCAPED = 0, 1, 2, 3
-STRETCHED = 0.2  # |sin| of the elbow below which a planar arm counts as out of its workspace
+STRETCHED = 0.2  # smallest |sin| of the elbow of a planar arm within its workspace
 TRACED = 10  # columns of a trace before q
 
 
 class DelayedLink(NamedTuple):
-    """Between states and torques.
+    """Delay and losses between states and torques.
 
     Attributes:
-        period: Time from tick to tick [s].
-        delay: Ticks between a state and the torque that answers it.
-        lost: Share of the states that do not arrive.
-        seed: Seed of which ones.
+        period: Control period [s].
+        delay: Delay from a state to its torque [ticks].
+        lost: Share of lost states.
+        seed: Seed of the losses.
     """
 
     period: float
@@ -30,14 +30,14 @@ class DelayedLink(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """How long a case is watched and what counts as what.
+    """Limits of the simulation of a case.
 
     Attributes:
-        least: Ticks that it runs at least.
-        most: Ticks that it runs at most.
-        window: Ticks over which the fastest motion is looked for; two in a row have to be quiet.
-        quiet: Speed, relative to its peak, below which it is at rest.
-        growth: Energy, relative to the first one, from which it is unbounded.
+        least: Smallest number of ticks.
+        most: Largest number of ticks.
+        window: Ticks of a window for the largest speed; two consecutive windows must be quiet.
+        quiet: Speed at rest relative to its peak.
+        growth: Unbounded energy relative to the initial one.
     """
 
     least: int
@@ -48,7 +48,7 @@ class Limits(NamedTuple):
 
 
 class Meter(NamedTuple):
-    """What is measured along the way, as arrays so that it can be written; all but `sums` of one.
+    """Measurements of a run, as mutable arrays of one element except `sums` and `least`.
 
     Speeds are square roots of twice the kinetic energy of robots and bodies together; energies
     are in joules.
@@ -61,10 +61,10 @@ class Meter(NamedTuple):
         least: Smallest sigma, nu and level of the tank.
         residual: Largest r = W - W(0) - supplied energy.
         mismatch: Largest |r + L|, which only rounding and the plant keep from zero.
-        imbalance: Sum over ticks of what the plant itself gained or lost.
+        imbalance: Sum over ticks of the energy error of the plant.
         sampling: Largest error of an account with power times time instead of measured work.
-        naive: That error now.
-        now: r now.
+        naive: Current value of that error.
+        now: Current r.
     """
 
     peak: Array
@@ -86,49 +86,49 @@ class Memory(NamedTuple):
     Attributes:
         q: Configuration of the plant, shape (m,).
         v: Velocity of the plant, shape (m,).
-        q_seen: Of the team when its state last arrived, shape (n,).
-        v_seen: Velocity then, shape (n,).
-        pending: Torques of impedance and decoupling under way, shape (delay + 1, 2, n).
-        torque: The torque in force, shape (n,).
-        force: Room for task forces, shape (n,) each.
-        seen: Time and potential energy of the weights when the state last arrived.
-        outside: Potential and kinetic energy of the surroundings now.
-        began: Port's storage and energy of the surroundings at the start.
-        heat: Heat of the surroundings since the start.
+        q_received: Configuration of the team in the last received state, shape (n,).
+        v_received: Velocity of the team in the last received state, shape (n,).
+        pending: Delayed torques of impedance and decoupling, shape (delay + 1, 2, n).
+        torque: Applied torque, shape (n,).
+        force: Work space for task forces, shape (n,) each.
+        received: Time and gravitational energy of the last received state.
+        environment: Potential and kinetic energy of the environment.
+        began: Initial storage of the port and energy of the environment.
+        heat: Heat of the environment since the start.
     """
 
     q: Array
     v: Array
-    q_seen: Array
-    v_seen: Array
+    q_received: Array
+    v_received: Array
     pending: Array
     torque: Array
     force: tuple[Array, Array]
-    seen: Array
-    outside: Array
+    received: Array
+    environment: Array
     began: Array
     heat: Array
 
 
 def new_meter() -> Meter:
-    """Before the start."""
+    """Create a meter."""
     one = [np.zeros(1) for _ in range(8)]
     low = np.full(1, -np.inf)
     return Meter(one[0], one[1], one[2], np.zeros(3), np.array([1.0, 1.0, np.inf]), low, *one[3:8])
 
 
 def new_memory(start: Array, n: int, delay: int) -> Memory:
-    """At the start."""
+    """Create the memory at the start."""
     return Memory(
         q=start[0].copy(),
         v=start[1].copy(),
-        q_seen=np.zeros(n),
-        v_seen=np.zeros(n),
+        q_received=np.zeros(n),
+        v_received=np.zeros(n),
         pending=np.zeros((delay + 1, 2, n)),
         torque=np.zeros(n),
         force=(np.zeros(n), np.zeros(n)),
-        seen=np.zeros(2),
-        outside=np.zeros(2),
+        received=np.zeros(2),
+        environment=np.zeros(2),
         began=np.zeros(2),
         heat=np.zeros(1),
     )

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Random passive environments: springs, dampers, masses, one-sided contacts and doors."""
+"""Random passive environments: springs, dampers, masses, unilateral contacts and doors."""
 
 from dataclasses import dataclass
 
@@ -9,28 +9,28 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.validation.gauntlet.arrays import SurroundingsArrays
 
 KINDS = ("spring", "door", "mass", "contact", "damper")
-# The first element couples; what follows may be anything.
+# Probabilities of the kinds: the first element couples robots, the others are arbitrary.
 FIRST = (0.6, 0.25, 0.1, 0.05, 0.0)
 FURTHER = (0.35, 0.15, 0.2, 0.2, 0.1)
-# Directions: two robots at different radii, all coordinates at random, a single coordinate.
+# Probabilities of directions: two robots, all coordinates, a single coordinate.
 SHAPES = (0.5, 0.35, 0.15)
-DAMPED = 0.3  # share of springs with a dashpot beside them
-PRELOAD = 2.0  # [J] energy that a spring holds at the start, at most
+DAMPED = 0.3  # share of springs with a parallel damper
+PRELOAD = 2.0  # [J] largest initial energy of a spring
 
 
 @dataclass(frozen=True)
 class Element:
-    """One thing that the robots touch, along one direction of all tool coordinates.
+    """Element of an environment along one direction of all tool coordinates.
 
     Attributes:
         kind: One of `KINDS`; a door is a body of its own behind a spring.
         direction: Unit vector over the tool coordinates, shape (n,).
-        stiffness: Of the spring, of a contact, of what the door hangs on [N/m].
-        damping: Of the dashpot beside the spring, or the damper itself [N s/m].
-        mass: Carried along the direction, or of the door [kg].
-        offset: Where the spring is relaxed or the contact begins [m].
-        hinge: Spring of a door against the ground [N/m].
-        friction: Damper of a door against the ground [N s/m].
+        stiffness: Stiffness of the spring, the contact or the door's coupling [N/m].
+        damping: Damping of the damper, or parallel to the spring [N s/m].
+        mass: Mass carried, or of the door [kg].
+        offset: Rest position of the spring or onset of the contact [m].
+        hinge: Stiffness of a door to the ground [N/m].
+        friction: Damping of a door to the ground [N s/m].
     """
 
     kind: str
@@ -43,7 +43,7 @@ class Element:
     friction: float = 0.0
 
     def text(self) -> str:
-        """For people."""
+        """Return a description of the element."""
         values = (
             f"{name} {value:.4g}"
             for name, value in vars(self).items()
@@ -56,19 +56,19 @@ class Element:
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number whose logarithm is evenly spread."""
+    """Draw a number with uniformly distributed logarithm."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def random_elements(
     rng: np.random.Generator, robots: int, axes: int, stiffest: float
 ) -> list[Element]:
-    """One to three elements, the first of which tends to couple robots.
+    """Draw one to three elements, of which the first often couples robots.
 
     Args:
-        rng: Source of randomness.
+        rng: Random number generator.
         robots: Number of robots.
-        axes: Axes of each.
+        axes: Number of axes of each robot.
         stiffest: Largest stiffness [N/m].
     """
     return [
@@ -113,7 +113,7 @@ def _element(
 
 
 def assembled(elements: list[Element], n: int) -> SurroundingsArrays:
-    """Matrices of all elements over n tool coordinates and one more per door."""
+    """Assemble the matrices of all elements over n tool coordinates and one per door."""
     m = n + sum(item.kind == "door" for item in elements)
     inertia, stiffness, damping = np.zeros((m, m)), np.zeros((m, m)), np.zeros((m, m))
     rest, preload, body = np.zeros(m), 0.0, n
