@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Fixtures of all tests that need ROS."""
+"""Fixtures of the tests that need ROS."""
 
 import fcntl
 import tempfile
@@ -14,13 +14,15 @@ if TYPE_CHECKING:
     from harness import Ros
     from programs import Programs
 
-DOMAINS = range(10, 60)  # Up to 101, ports stay below the ephemeral ones; other tests have theirs.
+DOMAINS = range(
+    10, 60
+)  # Up to 101 the ports stay below the ephemeral ones; other tests use 60 to 69.
 
 
 def pytest_sessionstart(session: pytest.Session) -> None:
-    """Compiles the law before any worker or program of a test would, each with its deadline.
+    """Compile the control law before tests with deadlines need it.
 
-    Also removes what programs that earlier tests have killed left in shared memory.
+    Also remove shared memory of programs that earlier tests have killed.
     """
     if not hasattr(session.config, "workerinput"):
         from noninteract_ros.control.fast.compile_ahead import compile_ahead
@@ -32,7 +34,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 
 @contextmanager
 def free_domain() -> Iterator[int]:
-    """A ROS domain that no other test on this machine uses at the same time."""
+    """Lock a ROS domain that no other test on this machine uses."""
     for number in DOMAINS:
         with Path(tempfile.gettempdir(), f"noninteract_ros_domain_{number}").open("w") as lock:
             try:
@@ -46,21 +48,21 @@ def free_domain() -> Iterator[int]:
 
 @pytest.fixture
 def domain() -> Iterator[int]:
-    """A ROS domain of its own for a test."""
+    """ROS domain of one test."""
     with free_domain() as number:
         yield number
 
 
 @pytest.fixture(scope="module")
 def module_domain() -> Iterator[int]:
-    """A ROS domain of its own for all tests of a module."""
+    """ROS domain of the tests of a module."""
     with free_domain() as number:
         yield number
 
 
 @pytest.fixture
 def ros(domain: int) -> Iterator["Ros"]:
-    """A private context with an executor."""
+    """Context and executor of one test."""
     from harness import Ros
 
     harness = Ros(domain)
@@ -70,9 +72,9 @@ def ros(domain: int) -> Iterator["Ros"]:
 
 @pytest.fixture
 def programs(tmp_path: Path, domain: int) -> Iterator["Programs"]:
-    """A starter of programs in processes of their own."""
+    """Launcher of programs in separate processes."""
     from programs import Programs
 
-    starter = Programs(tmp_path, domain)
-    yield starter
-    starter.close()
+    launcher = Programs(tmp_path, domain)
+    yield launcher
+    launcher.close()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes in this process, and an ear for what they say."""
+"""Nodes in the test process, and a monitor of their topics."""
 
 import gc
 import os
@@ -7,11 +7,15 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from copy import deepcopy
+from functools import partial
+from itertools import chain
 from typing import Any
 
 import numpy as np
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.srv import ListParameters
+from rclpy.duration import Duration
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -20,7 +24,7 @@ from rclpy.signals import SignalHandlerOptions
 from repository import ROOT
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
-from waiting import WITNESSES, until
+from waiting import DEADLINE, REPORTS, until
 
 from noninteract_ros.clock import seconds
 from noninteract_ros.nodes.common.node import ScenarioNode, spin
@@ -43,13 +47,13 @@ NODES: dict[str, Callable[..., ScenarioNode]] = {
 
 
 def paper(**changes: Any) -> dict[str, Any]:
-    """The scenario of the paper with changes: `key=value`, blocks merged; None removes a key."""
+    """Return the scenario `paper` with changes; blocks are merged, None removes a key."""
     values = read_parameters(ROOT / "config" / "paper.yaml")
     return merged(merged(values, {"haptic": {"start_time": 0.05}}), changes)
 
 
 def merged(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A nested mapping with changes."""
+    """Return a nested mapping with changes merged."""
     result = deepcopy(dict(values))
     for key, value in changes.items():
         if value is None:
@@ -62,7 +66,7 @@ def merged(values: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, A
 
 
 def flat(values: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted keys and values."""
+    """Yield dotted keys and values."""
     for key, value in values.items():
         if isinstance(value, Mapping):
             yield from flat(value, f"{path}{key}.")
@@ -70,66 +74,86 @@ def flat(values: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]
             yield f"{path}{key}", value
 
 
-class Ear:
-    """What a team and its controller say: every message once, by its stamp [ns]."""
+class TeamMonitor:
+    """Subscriptions to the states, commands and diagnostics of a team.
+
+    Args:
+        node: Node that subscribes.
+        joints: Names of the joints of the team.
+
+    Attributes:
+        states: First joint_states message of each stamp [ns].
+        commands: First joint_commands message of each stamp [ns].
+        received: Number of messages by topic, including repeated ones.
+        status: Newest level, message and values of each node.
+        now: Time of the newest state [s].
+    """
 
     def __init__(self, node: Node, joints: list[str]) -> None:
         self.node, self._codec = node, JointStateCodec(joints)
         self.states: dict[int, bytes] = {}
         self.commands: dict[int, bytes] = {}
         self.status: dict[str, tuple[int, str, dict[str, str]]] = {}
-        self._told_at: dict[str, float] = {}
+        self.received = {"joint_states": 0, "joint_commands": 0}
+        self._status_received_at: dict[str, float] = {}
         self.now = 0.0
-        take_state, take_command = self._keep(self.states), self._keep(self.commands)
-        node.create_subscription(JointState, "joint_states", take_state, DEEP, raw=True)
-        node.create_subscription(JointState, "joint_commands", take_command, DEEP, raw=True)
-        node.create_subscription(DiagnosticArray, "/diagnostics", self._note, DEEP)
+        for topic, messages in (("joint_states", self.states), ("joint_commands", self.commands)):
+            callback = partial(self._on_joints, topic, messages)
+            node.create_subscription(JointState, topic, callback, DEEP, raw=True)
+        node.create_subscription(DiagnosticArray, "/diagnostics", self._on_diagnostics, DEEP)
 
-    def _keep(self, kept: dict[int, bytes]) -> Callable[[bytes], None]:
-        def take(data: bytes) -> None:
-            stamp = int.from_bytes(data[4:8], "little") * 10**9
-            stamp += int.from_bytes(data[8:12], "little")
-            if kept is self.states:
-                self.now = seconds(stamp)
-            kept.setdefault(stamp, bytes(data))
+    def _on_joints(self, topic: str, messages: dict[int, bytes], data: bytes) -> None:
+        stamp = int.from_bytes(data[4:8], "little") * 10**9
+        stamp += int.from_bytes(data[8:12], "little")
+        if messages is self.states:
+            self.now = seconds(stamp)
+        messages.setdefault(stamp, bytes(data))
+        self.received[topic] += 1
 
-        return take
-
-    def _note(self, message: DiagnosticArray) -> None:
+    def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for item in message.status:
             values = {pair.key: pair.value for pair in item.values}
             name = item.name.rpartition("/")[2]
-            self._told_at[name] = time.monotonic()
+            self._status_received_at[name] = time.monotonic()
             self.status[name] = (item.level[0], item.message, values)
 
-    def last_words(self) -> list[str]:
-        """What each node said last, and how long ago."""
+    def report(self) -> list[str]:
+        """Return the newest status of each node and its age."""
         now = time.monotonic()
         return [
-            f"{name}, {now - self._told_at[name]:.1f} s ago: {text} {values}"
+            f"{name}, {now - self._status_received_at[name]:.1f} s ago: {text} {values}"
             for name, (_, text, values) in list(self.status.items())
         ]
 
-    def says(self, node: str, text: str) -> Callable[[], bool]:
-        """Whether the newest diagnostics of a node contain a text."""
+    def has_status(self, node: str, text: str) -> Callable[[], bool]:
+        """Return a condition: the newest status message of a node contains a text."""
         return lambda: text in self.status.get(node, (0, "", {}))[1]
 
+    def wait_for_status(self, node: str, text: str) -> None:
+        """Wait until the newest status message of a node contains a text."""
+        until(self.has_status(node, text), lambda: f"{node}: {text}")
+
     def value(self, node: str, key: str) -> str:
-        """One of the values in the newest diagnostics of a node."""
+        """Return a value of the newest status of a node, or ""."""
         return self.status.get(node, (0, "", {}))[2].get(key, "")
 
-    def renewed(self, node: str) -> Callable[[], bool]:
-        """Whether a node has told of itself since now."""
+    def has_new_status(self, node: str) -> Callable[[], bool]:
+        """Return a condition: a status of a node was received after this call."""
         before = self.status.get(node)
         return lambda: self.status.get(node) is not before
 
+    def wait_for_timers(self, node: str) -> None:
+        """Wait for two more status messages, in whose period all faster timers have run."""
+        for _ in range(2):
+            until(self.has_new_status(node), f"diagnostics of {node}")
+
     def newest(self) -> JointArrays:
-        """The newest state."""
+        """Return the newest state."""
         return self._codec.decode(self.states[next(reversed(self.states))])
 
-    def history(self, kept: dict[int, bytes]) -> tuple[np.ndarray, ...]:
-        """Times [s], positions, velocities and efforts, a row per stamp."""
-        rows = [self._codec.decode(kept[stamp]) for stamp in sorted(kept)]
+    def history(self, messages: dict[int, bytes]) -> tuple[np.ndarray, ...]:
+        """Return times [s], positions, velocities and efforts, one row per stamp."""
+        rows = [self._codec.decode(messages[stamp]) for stamp in sorted(messages)]
         times = np.array([seconds(row.stamp_ns) for row in rows])
         columns = [
             [np.zeros(0) if item is None else item for item in column]
@@ -139,7 +163,15 @@ class Ear:
 
 
 class Ros:
-    """A private context with an executor in a thread; nothing touches rclpy's own."""
+    """Context of one test with an executor in a thread.
+
+    Args:
+        domain: ROS domain.
+
+    Attributes:
+        context: Context, not the default one of rclpy.
+        probe: Node of the test itself.
+    """
 
     def __init__(self, domain: int) -> None:
         os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
@@ -151,10 +183,12 @@ class Ros:
         )
         self._executor = EventsExecutor(context=self.context)
         self._nodes: list[Node] = []
-        self._ears: list[Ear] = []
+        self._monitors: list[TeamMonitor] = []
         self._failures: list[Exception] = []
         self._threads: list[threading.Thread] = []
-        self.probe = self.node(rclpy.create_node("probe", namespace="team", context=self.context))
+        self.probe = self.add_node(
+            rclpy.create_node("probe", namespace="team", context=self.context)
+        )
         self._thread(spin, self._executor, self.context)
 
     def _thread(self, target: Callable[..., None], *arguments: Any) -> None:
@@ -167,8 +201,8 @@ class Ros:
         self._threads.append(threading.Thread(target=run, daemon=True))
         self._threads[-1].start()
 
-    def node(self, node: Any) -> Any:
-        """Lets a node live here."""
+    def add_node(self, node: Any) -> Any:
+        """Add a node to the executor, and run its loop in a thread."""
         self._executor.add_node(node)
         self._nodes.append(node)
         if isinstance(node, ScenarioNode) and node.has_loop:
@@ -180,48 +214,60 @@ class Ros:
             node.loop()
 
     def make(self, name: str, values: Mapping[str, Any]) -> Any:
-        """One of the programs' nodes, with a scenario."""
+        """Create the node of a program with a scenario."""
         overrides = [Parameter(key, value=value) for key, value in flat(values)]
-        return self.node(NODES[name](context=self.context, parameter_overrides=overrides))
+        return self.add_node(NODES[name](context=self.context, parameter_overrides=overrides))
 
     def remove(self, node: Node) -> None:
-        """Ends a node."""
+        """Destroy a node."""
         self._executor.remove_node(node)
         self._nodes.remove(node)
         node.destroy_node()
 
     def stack(self, values: Mapping[str, Any]) -> "Stack":
-        """All nodes of a scenario."""
+        """Create all nodes of a scenario."""
         return Stack(self, values)
 
-    def ear(self, values: Mapping[str, Any]) -> Ear:
-        """Listens to a team."""
-        ear = Ear(self.probe, list(Scenario.from_dict(dict(values)).build_team().joint_names))
-        self._ears.append(ear)
-        WITNESSES.append(ear.last_words)
-        return ear
+    def monitor(self, values: Mapping[str, Any]) -> TeamMonitor:
+        """Create a monitor of the team of a scenario."""
+        joints = list(Scenario.from_dict(dict(values)).team.joint_names)
+        monitor = TeamMonitor(self.probe, joints)
+        self._monitors.append(monitor)
+        REPORTS.append(monitor.report)
+        return monitor
 
     def call(self, kind: type, service: str, request: Any = None) -> Any:
-        """The answer of a service."""
+        """Call a service and return its response."""
         client = self.probe.create_client(kind, service)
         until(client.service_is_ready, f"service {service}")
-        answer = client.call_async(kind.Request() if request is None else request)
-        until(answer.done, f"answer of {service}")
+        future = client.call_async(kind.Request() if request is None else request)
+        until(future.done, f"response of {service}")
         self.probe.destroy_client(client)
-        return answer.result()
+        return future.result()
 
-    def matched(self, *publishers: Any) -> None:
-        """Waits until publishers have found a subscriber each."""
+    def wait_for_subscribers(self, *publishers: Any) -> None:
+        """Wait until each publisher has matched a subscriber."""
         for publisher in publishers:
             until(publisher.get_subscription_count, f"a subscriber of {publisher.topic_name}")
 
-    def close(self) -> None:
-        """Ends everything; what a node raised is raised here.
+    def drain(self) -> None:
+        """Wait until all messages of the nodes here, and the answers to them, are received.
 
-        Without collecting garbage, and then destroying the context, participants linger on.
+        Sequence barrier for tests that nothing happens: an acknowledged message is in the queue of
+        the executor, and the response of a service passes through the same queue after it.
         """
-        for ear in self._ears:
-            WITNESSES.remove(ear.last_words)
+        for _ in range(2):
+            for publisher in chain.from_iterable(node.publishers for node in self._nodes):
+                assert publisher.wait_for_all_acked(Duration(seconds=DEADLINE))
+            self.call(ListParameters, "probe/list_parameters")
+
+    def close(self) -> None:
+        """Destroy all nodes and the context; raise the first exception of a node.
+
+        Participants survive unless garbage is collected before the context is destroyed.
+        """
+        for monitor in self._monitors:
+            REPORTS.remove(monitor.report)
         self.context.try_shutdown()
         for thread in self._threads:
             thread.join(2.0)
@@ -236,12 +282,21 @@ class Ros:
 
 
 class Stack:
-    """All nodes of a scenario in this process; the team begins when everybody hears everybody."""
+    """All nodes of a scenario in the test process, with a paused team.
+
+    Args:
+        ros: Context.
+        values: Values of the scenario.
+
+    Attributes:
+        monitor: Monitor of the team.
+        nodes: Nodes by program name.
+    """
 
     def __init__(self, ros: Ros, values: Mapping[str, Any]) -> None:
         self.ros = ros
         self.values = merged(values, {"start_paused": True})
-        self.ear = ros.ear(self.values)
+        self.monitor = ros.monitor(self.values)
         names = ["controller"]
         names += [
             name
@@ -250,10 +305,10 @@ class Stack:
         ]
         self.nodes = {name: ros.make(name, self.values) for name in ["robot_team", *names]}
 
-    def begin(self) -> "Stack":
-        """Lets the team go."""
-        until(self._matched, "everybody hears everybody")
-        go(self.ros)
+    def start(self) -> "Stack":
+        """Unpause the team once all publishers have matched their subscribers."""
+        until(self._matched, "all publishers and subscribers matched")
+        unpause(self.ros)
         return self
 
     def _matched(self) -> bool:
@@ -270,12 +325,13 @@ class Stack:
         )
 
     def run_until(self, time_: float) -> None:
-        """Waits until the team has come to a time [s]."""
+        """Wait until the team has reached a time [s]."""
         until(
-            lambda: self.ear.now >= time_, lambda: f"the team at {time_} s, not {self.ear.now} s"
+            lambda: self.monitor.now >= time_,
+            lambda: f"the team at {time_} s, not {self.monitor.now} s",
         )
 
 
-def go(ros: Ros) -> None:
-    """Lets a paused team go."""
+def unpause(ros: Ros) -> None:
+    """Unpause the team."""
     ros.call(SetBool, "robot_team/pause", SetBool.Request(data=False))

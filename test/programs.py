@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The stack's programs in processes of their own."""
+"""Programs of the stack in separate processes."""
 
 import os
 import signal
@@ -9,19 +9,23 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from harness import Ear
+from harness import TeamMonitor
 from repository import ROOT
-from waiting import DEADLINE, WITNESSES, until
+from waiting import DEADLINE, REPORTS, until
 
 from noninteract_ros.nodes.common.parameter_files import write
 
 
 class Programs:
-    """Programs as processes; all are ended by `close`.
+    """Launcher of programs as processes.
 
     Args:
-        folder: Where parameter files and logs go.
-        domain: Their ROS domain.
+        folder: Folder of parameter files and logs.
+        domain: ROS domain of the programs.
+
+    Attributes:
+        environment: Environment of the processes.
+        running: Running processes by program name.
     """
 
     def __init__(self, folder: Path, domain: int) -> None:
@@ -32,22 +36,22 @@ class Programs:
             "OPENBLAS_NUM_THREADS": "1",
         }
         self.running: dict[str, subprocess.Popen[str]] = {}
-        WITNESSES.append(self._last_words)
+        REPORTS.append(self._report)
         self._started = 0
 
     def start(self, name: str, values: Mapping[str, Any]) -> subprocess.Popen[str]:
-        """One of the stack's programs, with a scenario."""
+        """Start a program of the stack with a scenario."""
         parameters = ["--ros-args", "--params-file", str(self.write(values))]
         return self.python(name, "-m", "noninteract_ros.nodes", name, *parameters)
 
     def write(self, values: Mapping[str, Any]) -> Path:
-        """A scenario's file."""
+        """Write the parameter file of a scenario."""
         file = self._folder / "scenario.yaml"
         write(file, values)
         return file
 
     def python(self, name: str, *arguments: str) -> subprocess.Popen[str]:
-        """A Python program."""
+        """Start a Python program."""
         self._started += 1
         with self._log(name).open("a") as log:
             process = subprocess.Popen(
@@ -61,18 +65,20 @@ class Programs:
         self.running[name] = process
         return process
 
-    def start_all(self, names: Sequence[str], values: Mapping[str, Any], ear: Ear) -> None:
-        """Starts programs and waits until each has found all its subscribers."""
+    def start_all(
+        self, names: Sequence[str], values: Mapping[str, Any], monitor: TeamMonitor
+    ) -> None:
+        """Start programs and wait until each publisher has matched all subscribers."""
         for name in names:
             self.start(name, values)
-        until(lambda: all(self._matched(ear, name) for name in names), f"{names} are ready")
+        until(lambda: all(self._matched(monitor, name) for name in names), f"{names} are ready")
 
-    def _matched(self, ear: Ear, name: str) -> bool:
+    def _matched(self, monitor: TeamMonitor, name: str) -> bool:
         assert self.running[name].poll() is None, self.log(name)
-        entries = ear.status.get(name, (0, "", {}))[2].get("subscribers", "").split(", ")
+        entries = monitor.status.get(name, (0, "", {}))[2].get("subscribers", "").split(", ")
         counts = [entry.rpartition(" ") for entry in entries]
         return len(counts) > 1 and all(
-            int(count) == ear.node.count_subscribers(topic)
+            int(count) == monitor.node.count_subscribers(topic)
             for topic, _, count in counts
             if topic.startswith("/team/")
         )
@@ -81,24 +87,24 @@ class Programs:
         return self._folder / f"{name}.log"
 
     def log(self, name: str) -> str:
-        """What a program has printed."""
+        """Return the output of a program."""
         return self._log(name).read_text()
 
-    def _last_words(self) -> list[str]:
-        """The end of each log, and who has ended."""
+    def _report(self) -> list[str]:
+        """Return the end of each log, and the programs that have ended."""
         ended = {name: process.poll() for name, process in self.running.items()}
         return [
             f"{name} ended with {status}" for name, status in ended.items() if status is not None
         ] + [f"{file.name}: {file.read_text()[-500:]}" for file in self._folder.glob("*.log")]
 
     def kill(self, name: str) -> None:
-        """Ends a program as `kill -9` does."""
+        """Kill a program with SIGKILL."""
         process = self.running.pop(name)
         process.send_signal(signal.SIGKILL)
         process.wait(DEADLINE)
 
     def close(self) -> None:
-        """Ends all programs."""
+        """Kill all programs."""
         for name in list(self.running):
             self.kill(name)
-        WITNESSES.remove(self._last_words)
+        REPORTS.remove(self._report)

@@ -1,23 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a wait in vain tells."""
+"""Error of a missed deadline."""
 
 import pytest
 import waiting
 
 
-def test_a_wait_in_vain_tells_how_things_are_at_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not how they were before; and whoever has seen something is asked."""
-    seen: list[int] = []
+def test_the_error_of_a_missed_deadline_has_the_last_state(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The name of the condition is evaluated at the deadline, and all reports are included."""
+    polls: list[int] = []
 
     def done() -> bool:
-        seen.append(len(seen))
+        polls.append(len(polls))
         return False
 
     monkeypatch.setattr(waiting, "DEADLINE", 0.05)
-    monkeypatch.setattr(waiting, "WITNESSES", [lambda: [f"seen up to {seen[-1]}"]])
+    monkeypatch.setattr(waiting, "REPORTS", [lambda: [f"polled up to {polls[-1]}"]])
     with pytest.raises(AssertionError) as caught:
-        waiting.until(done, lambda: f"more than {len(seen)}")
-    said = str(caught.value)
-    assert len(seen) > 1
-    assert f"more than {len(seen)}" in said
-    assert f"seen up to {seen[-1]}" in said
+        waiting.until(done, lambda: f"more than {len(polls)}")
+    text = str(caught.value)
+    assert len(polls) > 1
+    assert f"more than {len(polls)}" in text
+    assert f"polled up to {polls[-1]}" in text

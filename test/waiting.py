@@ -1,27 +1,27 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Waiting for something to happen, with a deadline and witnesses."""
+"""Waiting for a condition with a deadline."""
 
 import time
 from collections.abc import Callable
 from typing import Any
 
-DEADLINE = 30.0  # [s] for anything to happen
-WITNESSES: list[Callable[[], list[str]]] = []  # Asked for lines where something does not happen.
+DEADLINE = 30.0  # [s] for any condition
+REPORTS: list[Callable[[], list[str]]] = []  # Lines appended to the error of a missed deadline.
 
 
 def until(done: Callable[[], Any], what: str | Callable[[], str] = "") -> Any:
-    """Polls until something is true; what it was, then.
+    """Poll a condition until it is true, and return its value.
 
-    Where it does not come true, the error has what the programs said and printed last.
+    The error of a missed deadline has the last status and output of the programs.
 
     Args:
-        done: What is to be true.
-        what: Its name; a callable where the name tells of a state, for it is asked at the end.
+        done: Condition.
+        what: Name of the condition; a callable is evaluated at the deadline.
     """
     end = time.monotonic() + DEADLINE
     while not (value := done()):
         if time.monotonic() > end:
-            told = [f"not within {DEADLINE:.0f} s: {what() if callable(what) else what}"]
-            raise AssertionError("\n".join(told + [line for tell in WITNESSES for line in tell()]))
+            lines = [f"not within {DEADLINE:.0f} s: {what() if callable(what) else what}"]
+            raise AssertionError("\n".join(lines + [line for get in REPORTS for line in get()]))
         time.sleep(0.002)
     return value

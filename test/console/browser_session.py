@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from harness import Ear, Ros, paper
+from harness import Ros, TeamMonitor, paper
 from programs import Programs
 from repository import ROOT
 from waiting import DEADLINE, until
@@ -81,26 +81,26 @@ class BrowserSession:
 
     Attributes:
         browser: The browser.
-        ear: Received states and diagnostics of the team.
+        monitor: Received states and diagnostics of the team.
         port: Port of the console.
         ros: ROS context of the test.
     """
 
-    def __init__(self, browser: Browser, ear: Ear, port: int, ros: Ros) -> None:
-        self.browser, self.ear, self.port, self.ros = browser, ear, port, ros
-        until(lambda: len(ear.states) > 10, "states of the team")
+    def __init__(self, browser: Browser, monitor: TeamMonitor, port: int, ros: Ros) -> None:
+        self.browser, self.monitor, self.port, self.ros = browser, monitor, port, ros
+        until(lambda: len(monitor.states) > 10, "states of the team")
 
     @classmethod
     def open(cls, ros: Ros, programs: Programs, browser: Browser) -> BrowserSession:
         """Start the programs of the scenario, one after the other."""
         values = scenario()
-        ear = ros.ear(values)
+        monitor = ros.monitor(values)
         programs.environment |= {"NONINTERACT_CONSOLE_TOKEN": TOKEN}
         for name in PROGRAMS:
             programs.start(name, values)
         for name in PROGRAMS:  # Each has its own deadline, since they start slowly together.
-            until(partial(ear.status.__contains__, name), f"diagnostics of {name}")
-        return cls(browser, ear, console_port(programs, PROGRAMS[3]), ros)
+            until(partial(monitor.status.__contains__, name), f"diagnostics of {name}")
+        return cls(browser, monitor, console_port(programs, PROGRAMS[3]), ros)
 
     @contextmanager
     def page(
@@ -124,12 +124,12 @@ class BrowserSession:
 
     def centre(self) -> np.ndarray:
         """Return the centre of the team, shape (2,) [m]."""
-        positions = self.ear.newest().position
+        positions = self.monitor.newest().position
         return positions.reshape(2, 2).mean(axis=0)
 
     def speed(self) -> float:
         """Return the speed of the fastest joint [m/s]."""
-        return float(np.abs(self.ear.newest().velocity).max())
+        return float(np.abs(self.monitor.newest().velocity).max())
 
     def wait_until_moving(self, faster: float = 0.1, pressed: Page | None = None) -> None:
         """Wait until the team moves faster than a speed [m/s].
@@ -160,17 +160,17 @@ class BrowserSession:
         """
         self.wait_until_moving()
         release()
-        start = self.ear.now
+        start = self.monitor.now
         self.wait_until_rest()
-        times, _, v, _ = self.ear.history(self.ear.states)
+        times, _, v, _ = self.monitor.history(self.monitor.states)
         moving = (np.abs(v).max(axis=1) >= REST_SPEED) & (times >= start)
         return float(times[moving][-1] - start) if moving.any() else 0.0
 
     def stays_at_rest(self, seconds: float = 0.3) -> bool:
         """Return True if the team rests for a duration of its own time [s]."""
-        start = self.ear.now
-        until(lambda: self.ear.now > start + seconds, "further states")
-        times, _, v, _ = self.ear.history(self.ear.states)
+        start = self.monitor.now
+        until(lambda: self.monitor.now > start + seconds, "further states")
+        times, _, v, _ = self.monitor.history(self.monitor.states)
         return bool((np.abs(v[times >= start]) < REST_SPEED).all())
 
 

@@ -274,7 +274,7 @@ def test_the_page_shows_an_authority_set_elsewhere(session: BrowserSession, page
     """The buttons follow hand-overs by topic and by parameter."""
     wait_for_authority(page, "autonomy")
     publisher = session.ros.probe.create_publisher(String, "relative/authority", 10)
-    session.ros.matched(publisher)
+    session.ros.wait_for_subscribers(publisher)
     publisher.publish(String(data="human"))
     wait_for_authority(page, "human")
     parameter = Parameter("relative.authority", value="autonomy").to_parameter_msg()
@@ -291,12 +291,12 @@ def test_the_relative_subtask_is_driven_after_a_hand_over(
     """Driving it changes the distance of the robots and not the centre of the team."""
     hand_over(page, "relative", "human")
     page.select_option("#driven", "relative/0")
-    start, before = session.centre(), session.ear.newest().position.copy()
+    start, before = session.centre(), session.monitor.newest().position.copy()
     page.keyboard.down("ArrowLeft")
     session.wait_until_moving(0.1)
     page.keyboard.up("ArrowLeft")
     session.wait_until_rest()
-    now = session.ear.newest().position
+    now = session.monitor.newest().position
     assert (before - now)[0] - (before - now)[2] > 0.02
     assert np.abs(session.centre() - start).max() < 1e-3
     hand_over(page, "relative", "autonomy")
@@ -329,10 +329,10 @@ def test_the_simulation_is_paused_stepped_and_reset(session: BrowserSession, pag
     wait(page, "operatorConsole.status().paused")
     programs = "document.querySelector('#programs').textContent"
     wait(page, f"{programs}.includes('waiting: the team is paused')")
-    paused_at = session.ear.now
+    paused_at = session.monitor.now
     page.click("#step")
-    until(lambda: session.ear.now > paused_at, "a step of the team")
-    assert session.ear.now == pytest.approx(paused_at + 1.0 / 200.0, abs=1e-6)
+    until(lambda: session.monitor.now > paused_at, "a step of the team")
+    assert session.monitor.now == pytest.approx(paused_at + 1.0 / 200.0, abs=1e-6)
     page.click("#pause")
     wait(page, "!operatorConsole.status().paused")
     page.click("#reset")
@@ -399,11 +399,11 @@ def attacks(session: BrowserSession) -> Iterator[tuple[str, Callable[[], Any]]]:
 def test_rejected_messages_move_nothing(session: BrowserSession) -> None:
     """Foreign origins, wrong tokens and invalid or too many messages have no effect."""
     session.wait_until_rest()
-    start = session.ear.now
+    start = session.monitor.now
     for name, attack in attacks(session):
         attack()
         assert session.stays_at_rest(0.05), name
-    assert session.ear.now > start
+    assert session.monitor.now > start
 
 
 def test_the_page_fits_a_phone(session: BrowserSession) -> None:

@@ -57,7 +57,7 @@ class CooperativePose:
 
     def read(self) -> Array:
         """Return the newest pose, shape (7,)."""
-        q = self._team.configuration_from_joints(self._session.ear.newest().position)
+        q = self._team.configuration_from_joints(self._session.monitor.newest().position)
         x = self._stack.evaluate(self._team.state(q, np.zeros(self._team.n))).x
         return x[self._stack.value_slices[0]]
 
@@ -80,7 +80,7 @@ def test_the_ring_of_the_handle_rotates_the_team(
             Ros(domain),
         )  # A demo starts only in an empty namespace.
         cleanup.callback(ros.close)
-        session = BrowserSession(browser, ros.ear(values), port, ros)
+        session = BrowserSession(browser, ros.monitor(values), port, ros)
         page, pose = cleanup.enter_context(session.page()), CooperativePose(values, session)
         page.select_option("#driven", "cooperative/0")
         page.click("#rotate")

@@ -153,7 +153,7 @@ class Pest:
         self._publisher.publish(message)
 
     def refused(self) -> int:
-        values = self._stack.ear.status.get(self._node, (0, "", {}))[2]
+        values = self._stack.monitor.status.get(self._node, (0, "", {}))[2]
         return int(values.get(f"rejected on {self._topic}", 0))
 
     def annoy(self, message: Any, reason: str) -> None:
@@ -163,7 +163,7 @@ class Pest:
 
         def said() -> bool:
             self._stack.nodes[self._node].publish_diagnostics()
-            values = self._stack.ear.status.get(self._node, (0, "", {}))[2]
+            values = self._stack.monitor.status.get(self._node, (0, "", {}))[2]
             last = values.get("last rejection", "")
             named = last.startswith(f"{self._topic}: ") and re.search(reason, last)
             return self.refused() > before and bool(named)
@@ -184,7 +184,7 @@ def test_bad_input_of_every_kind_changes_nothing(ros: Ros) -> None:
     stack = ros.stack(values)
     pests = [(Pest(stack, *where), make, kinds) for *where, make, kinds in topics()]
     until(lambda: all(pest.ready() for pest, *_ in pests), "everybody hears the pests")
-    stack.begin()
+    stack.start()
     stack.run_until(0.1)
     for (_, topic, *_), (pest, make, kinds) in zip(topics(), pests, strict=True):
         if harmless(topic):
@@ -198,10 +198,10 @@ def test_bad_input_of_every_kind_changes_nothing(ros: Ros) -> None:
     # Good stamps are ticks; those of the pests are none, or far ahead.
     own = {
         stamp: data
-        for stamp, data in list(stack.ear.states.items())
+        for stamp, data in list(stack.monitor.states.items())
         if stamp % 10**6 == 0 and stamp < 10**9 * FAR
     }
-    t, q, v, effort = stack.ear.history(own)
+    t, q, v, effort = stack.monitor.history(own)
     expected = rehearse(Scenario.from_dict(values), t[-1])
     np.testing.assert_array_equal(t[:-1], expected.t)
     np.testing.assert_array_equal(q[:-1], expected.q)

@@ -4,7 +4,6 @@
 import numpy as np
 from harness import Ros, merged
 from repository import ROOT
-from waiting import until
 
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.files import read_parameters
@@ -21,11 +20,11 @@ def test_thirty_robots_run_through_the_stack(ros: Ros) -> None:
     """All nodes, in lockstep: the states are the rehearsal's, to the bit."""
     values = scenario()
     rate = values["rate"]
-    stack = ros.stack(merged(values, {"end_time": TICKS / rate})).begin()
-    until(stack.ear.says("robot_team", "finished"), "the end of the run")
+    stack = ros.stack(merged(values, {"end_time": TICKS / rate})).start()
+    stack.monitor.wait_for_status("robot_team", "finished")
     expected = rehearse(Scenario.from_dict(stack.values), TICKS / rate)
     assert expected.q.shape == (TICKS, 60)
-    _, q, v, effort = stack.ear.history(stack.ear.states)
+    _, q, v, effort = stack.monitor.history(stack.monitor.states)
     np.testing.assert_array_equal(q[:-1], expected.q)
     np.testing.assert_array_equal(v[:-1], expected.v)
     np.testing.assert_array_equal(effort[1:], expected.torque)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from harness import Ear, Ros, paper
+from harness import Ros, TeamMonitor, paper
 from programs import Programs
 from waiting import until
 
@@ -41,8 +41,8 @@ def shares_memory(process: int) -> bool:
     return "/dev/shm/fastrtps_port" in Path(f"/proc/{process}/maps").read_text()
 
 
-def running(ear: Ear) -> bool:
-    return all(ear.status.get(name, (0, ""))[1] == "running" for name in NAMES)
+def running(monitor: TeamMonitor) -> bool:
+    return all(monitor.status.get(name, (0, ""))[1] == "running" for name in NAMES)
 
 
 @pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "wall"])
@@ -60,52 +60,52 @@ def test_a_killed_program_is_noticed_and_may_return(
         cooperative={"takeover": "shaped"},
         relative={"takeover": "shaped"},
     )
-    ear = ros.ear(values)
+    monitor = ros.monitor(values)
     programs.environment.pop("FASTRTPS_DEFAULT_PROFILES_FILE", None)
     for name in NAMES:
         programs.start(name, values)
     for victim in NAMES:
-        until(lambda: running(ear), f"all run, before {victim} is killed")
+        until(lambda: running(monitor), f"all run, before {victim} is killed")
         # It might hold a lock there when it is killed, for which the others would wait.
         assert not shares_memory(programs.running[victim].pid)
         programs.kill(victim)
-        ear.status.pop(victim)
+        monitor.status.pop(victim)
         for name, text in NOTICES[victim][lockstep].items():
-            until(ear.says(name, text), f"{name} says {text!r} of {victim}")
-        SAFE[victim](ear, lockstep)
+            monitor.wait_for_status(name, text)
+        SAFE[victim](monitor, lockstep)
         programs.start(victim, values)
-    until(lambda: running(ear), "all run at the end")
-    heard = len(ear.states)
-    until(lambda: len(ear.states) > heard + 20, "the team moves on")
+    until(lambda: running(monitor), "all run at the end")
+    heard = len(monitor.states)
+    until(lambda: len(monitor.states) > heard + 20, "the team moves on")
 
 
-def led_on(ear: Ear, lockstep: bool) -> None:
+def led_on(monitor: TeamMonitor, lockstep: bool) -> None:
     """The team goes on without a source, and comes to rest."""
-    heard = len(ear.states)
-    until(lambda: len(ear.states) > heard + 20, "the team goes on")
+    heard = len(monitor.states)
+    until(lambda: len(monitor.states) > heard + 20, "the team goes on")
 
 
-def brakes(ear: Ear, lockstep: bool) -> None:
+def brakes(monitor: TeamMonitor, lockstep: bool) -> None:
     """Without commands the team stands still (lockstep), or brakes to rest (wall time)."""
     if lockstep:
-        heard = len(ear.states)
-        until(ear.renewed("robot_team"), "the team speaks on")
-        assert len(ear.states) == heard
+        heard = len(monitor.states)
+        until(monitor.has_new_status("robot_team"), "the team speaks on")
+        assert len(monitor.states) == heard
     else:
-        until(lambda: np.abs(ear.newest().velocity).max() < 1e-3, "the team is at rest")
+        until(lambda: np.abs(monitor.newest().velocity).max() < 1e-3, "the team is at rest")
 
 
-def holds(ear: Ear, lockstep: bool) -> None:
+def holds(monitor: TeamMonitor, lockstep: bool) -> None:
     """Without states the controller commands nothing."""
-    heard = len(ear.commands)
-    until(ear.renewed("controller"), "the controller speaks on")
-    assert len(ear.commands) == heard
+    heard = len(monitor.commands)
+    until(monitor.has_new_status("controller"), "the controller speaks on")
+    assert len(monitor.commands) == heard
     if lockstep:  # The new team counts its time anew.
-        ear.states.clear()
-        ear.commands.clear()
+        monitor.states.clear()
+        monitor.commands.clear()
 
 
-SAFE: dict[str, Callable[[Ear, bool], None]] = {
+SAFE: dict[str, Callable[[TeamMonitor, bool], None]] = {
     "haptic_emulator": led_on,
     "relative_planner": led_on,
     "controller": brakes,

@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from harness import Ros, go, paper
+from harness import Ros, paper, unpause
 from programs import Programs
 from waiting import until
 
@@ -19,11 +19,11 @@ TICKS = 1000
 def test_every_run_is_the_rehearsal(ros: Ros, programs: Programs, run: int) -> None:
     """States and commands of four processes are the rehearsal's to the bit, so all runs agree."""
     values = paper(start_paused=True, end_time=TICKS / 1000, haptic={"start_time": 0.2})
-    ear = ros.ear(values)
-    programs.start_all(NAMES, values, ear)
-    go(ros)
-    until(ear.says("robot_team", "finished"), "the end of the run")
-    until(lambda: len(ear.commands) > TICKS, "the command that answers the last state")
+    monitor = ros.monitor(values)
+    programs.start_all(NAMES, values, monitor)
+    unpause(ros)
+    monitor.wait_for_status("robot_team", "finished")
+    until(lambda: len(monitor.commands) > TICKS, "the command that answers the last state")
     scenario = Scenario.from_dict(values)
     expected = rehearse(scenario, (TICKS + 1) / 1000)
     codec = JointStateCodec(scenario.build_team().joint_names)
@@ -31,20 +31,20 @@ def test_every_run_is_the_rehearsal(ros: Ros, programs: Programs, run: int) -> N
     for tick in range(TICKS + 1):
         stamp = 10**6 * tick
         state = codec.encode(stamp, expected.q[tick], expected.v[tick], applied[tick])
-        assert ear.states.pop(stamp) == state, f"state {tick}"
+        assert monitor.states.pop(stamp) == state, f"state {tick}"
         command = codec.encode(stamp, effort=expected.torque[tick])
-        assert ear.commands.pop(stamp) == command, f"command {tick}"
-    assert not ear.states
-    assert not ear.commands
+        assert monitor.commands.pop(stamp) == command, f"command {tick}"
+    assert not monitor.states
+    assert not monitor.commands
 
 
 def test_a_hand_that_feels_is_waited_for(ros: Ros) -> None:
     """With feedback in the loop, device and controller take turns as in the rehearsal."""
     values = paper(haptic={"hand_mass": 0.5}, end_time=0.3)
-    stack = ros.stack(values).begin()
-    until(stack.ear.says("robot_team", "finished"), "the end of the run")
+    stack = ros.stack(values).start()
+    stack.monitor.wait_for_status("robot_team", "finished")
     expected = rehearse(Scenario.from_dict(stack.values), 0.3)
-    _, q, _, effort = stack.ear.history(stack.ear.states)
+    _, q, _, effort = stack.monitor.history(stack.monitor.states)
     np.testing.assert_array_equal(q[:-1], expected.q)
     np.testing.assert_array_equal(effort[1:], expected.torque)
     rigid = rehearse(Scenario.from_dict(paper()), 0.3)
@@ -54,11 +54,11 @@ def test_a_hand_that_feels_is_waited_for(ros: Ros) -> None:
 def test_sources_that_are_missing_are_not_waited_for_for_long(ros: Ros) -> None:
     """A source that is not started, or falls silent, holds the team up for a while only."""
     values = paper(haptic=None, lockstep_sources=["relative/autonomy"], lockstep_timeout=0.3)
-    stack = ros.stack(values).begin()
+    stack = ros.stack(values).start()
     stack.run_until(0.1)
     ros.remove(stack.nodes.pop("relative_planner"))
-    until(stack.ear.says("controller", "running without relative/autonomy"), "its absence")
-    now = stack.ear.now
+    stack.monitor.wait_for_status("controller", "running without relative/autonomy")
+    now = stack.monitor.now
     stack.run_until(now + 0.1)
     ros.make("relative_planner", stack.values)
-    until(stack.ear.says("controller", "holding cooperative"), "its return")
+    stack.monitor.wait_for_status("controller", "holding cooperative")

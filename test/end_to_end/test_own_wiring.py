@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from harness import Ear, Ros, go, merged
+from harness import Ros, TeamMonitor, merged, unpause
 from programs import Programs
 from repository import ROOT
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
@@ -26,11 +26,11 @@ def own_robots(**changes: Any) -> dict[str, Any]:
 def test_the_wiring_changes_nothing_in_lockstep(ros: Ros, programs: Programs) -> None:
     """Over 0.5 s of motion the states are those of a rehearsal, to rounding of gravity."""
     values = own_robots(end_time=0.5, start_paused=True, haptic={"start_time": 0.05})
-    ear = ros.ear(values)
-    programs.start_all(NAMES, values, ear)
-    go(ros)
-    until(ear.says("robot_team", "finished"), "the end of the run")
-    _, q, v, effort = ear.history(ear.states)
+    monitor = ros.monitor(values)
+    programs.start_all(NAMES, values, monitor)
+    unpause(ros)
+    monitor.wait_for_status("robot_team", "finished")
+    _, q, v, effort = monitor.history(monitor.states)
     expected = rehearse(Scenario.from_dict(values), 0.5)
     assert len(q) == 501
     assert np.abs(expected.q[-1] - expected.q[0]).max() > 1e-3
@@ -57,24 +57,24 @@ WALL: dict[str, Any] = {
 def test_in_wall_time_they_reach_and_hold_a_place(ros: Ros, programs: Programs) -> None:
     """Two arms that speak at different times are led; without a controller each brakes."""
     values = own_robots(**WALL)
-    ear = ros.ear(values)
+    monitor = ros.monitor(values)
     team = Scenario.from_dict(values).build_team()
 
     def middle() -> Any:
-        newest = ear.newest().position if ear.states else team.q0
+        newest = monitor.newest().position if monitor.states else team.q0
         return team.state(np.array(newest), np.zeros(4)).tool_positions[:, ::2].mean(axis=0)
 
-    programs.start_all(NAMES, values, ear)
+    programs.start_all(NAMES, values, monitor)
     until(lambda: np.abs(middle() - [0.0, 0.5]).max() < 0.01, "the place")
     programs.kill("controller")
-    until(ear.says("robot_team", "braking: command timeout"), "the team brakes")
+    monitor.wait_for_status("robot_team", "braking: command timeout")
 
 
 def test_a_controller_that_is_ended_brakes_the_team_first(ros: Ros, programs: Programs) -> None:
     """Its last words are gravity alone, since effort controllers hold them for ever."""
     circle = {"motion": "circle", "centre": [0.0, 0.6], "start_time": 0.0, "ramp_time": 1.0}
     values = own_robots(**merged(WALL, {"haptic": circle}))
-    ear = ros.ear(values)
+    monitor = ros.monitor(values)
     heard: dict[str, list[float]] = {}
     for side in ("left", "right"):
 
@@ -83,12 +83,14 @@ def test_a_controller_that_is_ended_brakes_the_team_first(ros: Ros, programs: Pr
 
         topic = f"{side}_effort_controller/commands"
         ros.probe.create_subscription(Float64MultiArray, topic, note, 10)
-    programs.start_all(NAMES, values, ear)
-    until(lambda: ear.states and np.abs(ear.newest().velocity).max() > 0.1, "the team moves")
+    programs.start_all(NAMES, values, monitor)
+    until(
+        lambda: monitor.states and np.abs(monitor.newest().velocity).max() > 0.1, "the team moves"
+    )
     controller = programs.running["controller"]
     controller.send_signal(signal.SIGINT)
     assert controller.wait(DEADLINE) == 0, programs.log("controller")
-    last = ear.newest()
+    last = monitor.newest()
     assert np.abs(last.velocity).max() < 0.02
     gravity = Scenario.from_dict(values).build_team().gravity(last.position)
     until(lambda: heard["left"] == [0.0, 0.0], "that the left arm is left to its own gravity")
@@ -99,17 +101,17 @@ def test_a_controller_that_is_ended_brakes_the_team_first(ros: Ros, programs: Pr
 def test_arrays_that_answer_nothing_do_not_move_a_lockstep_team(ros: Ros, label: str) -> None:
     """Torques without the stamp of a state, or with a wrong one, are refused with the reason."""
     values = own_robots(haptic=None, planner=None, lockstep_sources=None)
-    ear: Ear = ros.ear(values)
+    monitor: TeamMonitor = ros.monitor(values)
     team = ros.make("robot_team", values)
     sides = [
         ros.probe.create_publisher(Float64MultiArray, f"{side}_effort_controller/commands", 1)
         for side in ("left", "right")
     ]
-    ros.matched(*sides)
+    ros.wait_for_subscribers(*sides)
     for publisher in sides:
         message = Float64MultiArray(data=[0.0, 0.0])
         message.layout.dim = [MultiArrayDimension(label=label, size=2, stride=2)]
         publisher.publish(message)
     expected = "answers no state" if label else "no stamp of the answered state"
-    until(lambda: expected in ear.value("robot_team", "last rejection"), "the refusal")
+    until(lambda: expected in monitor.value("robot_team", "last rejection"), "the refusal")
     assert team._simulation.tick == 0

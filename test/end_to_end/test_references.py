@@ -60,16 +60,16 @@ def test_the_team_follows_another_process(
         robot_1={"initial_position": [0.5, 0.5]},
         robot_2={"initial_position": [-0.5, -0.5]},
     )
-    stack = ros.stack(values).begin()
-    until(stack.ear.says("controller", "holding cooperative: source silent"), "nobody leads")
+    stack = ros.stack(values).start()
+    stack.monitor.wait_for_status("controller", "holding cooperative: source silent")
     programs.python("person", "-c", program)
 
     def there() -> bool:
-        positions = np.reshape(stack.ear.newest().position, (2, 2))
+        positions = np.reshape(stack.monitor.newest().position, (2, 2))
         return bool(np.abs(positions.mean(axis=0) - PLACE).max() < 2e-3)
 
     until(there, "the team is there")
-    positions = np.reshape(stack.ear.history(dict(stack.ear.states))[1], (-1, 2, 2))
+    positions = np.reshape(stack.monitor.history(dict(stack.monitor.states))[1], (-1, 2, 2))
     apart = positions[:, 0] - positions[:, 1]
     np.testing.assert_allclose(apart, np.ones_like(apart), atol=1e-3 if not lockstep else 1e-9)
     # A jump of the reference would throw the team off by half of it and more at once.

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs of `test_delivery.py`: one that reads, and one that speaks faster than it can.
+"""Programs of `test_delivery.py`: a reader, and a writer that overruns it.
 
-`overrun.py read` prints how many messages it had when its publisher was gone. `overrun.py write
-PID` says `COUNT` messages, most of them while it has stopped that reader, and ends when the reader
-has them, or soon.
+`overrun.py read` prints how many messages it has received when its publisher has ended.
+`overrun.py write PID` publishes `COUNT` messages, most of them while that reader is stopped, and
+ends when all are acknowledged, or after `ACK_TIMEOUT`.
 """
 
 import os
@@ -22,47 +22,47 @@ from noninteract_ros.nodes.recording.raw_subscription import RawSubscription
 
 TOPIC = "/overrun"
 COUNT = 900
-SIZE = 600  # bytes; so many of them do not fit into the buffer of a socket
+SIZE = 600  # bytes; together they do not fit into a socket buffer
 PERIOD = 0.001  # [s]
-PATIENCE = 20.0  # [s]
-SOON = 1.5  # [s] many heartbeats, and half of what one takes by default
+TIMEOUT = 20.0  # [s]
+ACK_TIMEOUT = 1.5  # [s] many heartbeats, and half of the default heartbeat period
 
 
 class Writer(Node):
-    """Speaks without a pause, and leaves soon."""
+    """Node that publishes continuously and then ends."""
 
     handles_shutdown = False
 
     def __init__(self) -> None:
         super().__init__("writer")
         self._reader = int(sys.argv.pop())
-        self._to = self.create_publisher(String, TOPIC, LOOP_QOS)
+        self._publisher = self.create_publisher(String, TOPIC, LOOP_QOS)
 
     def run(self) -> None:
-        """Waits for its reader, then says everything."""
-        end = time.monotonic() + PATIENCE
-        while not self._to.get_subscription_count() and time.monotonic() < end:
+        """Wait for the reader, then publish all messages."""
+        end = time.monotonic() + TIMEOUT
+        while not self._publisher.get_subscription_count() and time.monotonic() < end:
             time.sleep(0.05)
         for number in range(COUNT):
             if number == COUNT // 4:
                 os.kill(self._reader, signal.SIGSTOP)
-            self._to.publish(String(data="x" * SIZE))
+            self._publisher.publish(String(data="x" * SIZE))
             time.sleep(PERIOD)
         os.kill(self._reader, signal.SIGCONT)
-        self._to.wait_for_all_acked(Duration(seconds=SOON))
+        self._publisher.wait_for_all_acked(Duration(seconds=ACK_TIMEOUT))
 
 
 def read() -> None:
-    """Reads until its publisher is gone."""
+    """Read until the publisher has ended."""
     rclpy.init()
     node = Node("reader")
     feed = RawSubscription(node, TOPIC, "std_msgs/msg/String")
-    heard = 0
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end and (not heard or node.count_publishers(TOPIC)):
-        heard += feed.drain(lambda *_: None)
+    count = 0
+    end = time.monotonic() + TIMEOUT
+    while time.monotonic() < end and (not count or node.count_publishers(TOPIC)):
+        count += feed.drain(lambda *_: None)
         time.sleep(0.002)
-    print(heard + feed.drain(lambda *_: None))
+    print(count + feed.drain(lambda *_: None))
 
 
 if __name__ == "__main__":

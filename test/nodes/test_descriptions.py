@@ -71,12 +71,12 @@ def say(ros: Ros) -> Any:
 def test_a_controller_waits_says_so_refuses_and_goes_on(ros: Ros, say: Any) -> None:
     """Missing descriptions are named; what is no URDF is refused in words; then all is built."""
     values = on_topics()
-    ear = ros.ear(PLANAR)
+    monitor = ros.monitor(PLANAR)
     controller = Waiting(ros, "controller", values)
     both = "description of left on /left/robot_description, right on /team/right_described"
-    until(ear.says("controller", f"waiting for the {both}"), "what it waits for")
+    monitor.wait_for_status("controller", f"waiting for the {both}")
     say("right", TEXTS["right"])
-    until(ear.says("controller", "description of left on /left/robot_description"), "the left one")
+    monitor.wait_for_status("controller", "description of left on /left/robot_description")
     for text, expected in (
         ("<robot", "text that is not XML"),
         ("<sdf/>", "XML with the root <sdf>"),
@@ -87,16 +87,16 @@ def test_a_controller_waits_says_so_refuses_and_goes_on(ros: Ros, say: Any) -> N
     ):
         say("left", text)
         until(
-            ear.says(
+            monitor.has_status(
                 "controller",
                 f"rejected the description of left on /left/robot_description: found {expected}",
             ),
             expected,
         )
-        assert ear.status["controller"][0] == 2
+        assert monitor.status["controller"][0] == 2
     say("left", TEXTS["left"])
     until(controller.made, "the controller")
-    until(ear.says("controller", "waiting for the first state"), "that it is ready")
+    monitor.wait_for_status("controller", "waiting for the first state")
     team = controller.node.core.team
     expected_team = Scenario.from_dict(PLANAR).build_team()
     v = np.array([0.5, -1.0, 2.0, 0.3])
@@ -117,23 +117,25 @@ def test_the_same_again_is_no_news_and_another_one_stops(
     for name, text in TEXTS.items():
         say(name, text)
     values = on_topics(rate=100.0, telemetry_rate=100.0, lockstep=lockstep)
-    ear = ros.ear(PLANAR)
+    monitor = ros.monitor(PLANAR)
     waiting = [Waiting(ros, name, values) for name in ("robot_team", "controller")]
     for item in waiting:
         until(item.made, "the node")
-    until(ear.says("controller", "holding cooperative, relative: source silent"), "the team runs")
+    monitor.wait_for_status("controller", "holding cooperative, relative: source silent")
     say("left", TEXTS["left"] + "\n")
-    until(ear.renewed("controller"))
-    until(ear.renewed("controller"))
-    assert "changed" not in ear.status["controller"][1]
+    until(monitor.has_new_status("controller"))
+    until(monitor.has_new_status("controller"))
+    assert "changed" not in monitor.status["controller"][1]
     say("left", TEXTS["left"].replace("1.0", "2.0"))
     for name in ("controller", "robot_team"):
-        until(ear.says(name, "the description of left has changed; restart the node"), name)
-        assert ear.status[name][0] == 2
+        until(
+            monitor.has_status(name, "the description of left has changed; restart the node"), name
+        )
+        assert monitor.status[name][0] == 2
     say("left", TEXTS["left"])
-    until(ear.renewed("controller"))
-    until(ear.renewed("controller"))
-    assert "holding: the description of left has changed" in ear.status["controller"][1]
+    until(monitor.has_new_status("controller"))
+    until(monitor.has_new_status("controller"))
+    assert "holding: the description of left has changed" in monitor.status["controller"][1]
     assert waiting[1].node.core.mode.stopped
 
 
@@ -154,9 +156,9 @@ def test_without_a_program_a_topic_is_no_description() -> None:
 
 def test_a_program_that_waits_ends_when_it_is_told_to(ros: Ros, programs: Programs) -> None:
     """Ctrl-C while it waits: exit status 0, no traceback."""
-    ear = ros.ear(PLANAR)
+    monitor = ros.monitor(PLANAR)
     process = programs.start("controller", on_topics())
-    until(ear.says("controller", "waiting for the description"), "that it waits")
+    monitor.wait_for_status("controller", "waiting for the description")
     process.send_signal(signal.SIGINT)
     assert process.wait(DEADLINE) == 0
     assert "Traceback" not in programs.log("controller")

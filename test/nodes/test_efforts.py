@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Torques as Float64MultiArray, and states as drivers tell them."""
+"""Torques as Float64MultiArray, and joint states of drivers."""
 
 from typing import Any
 
@@ -16,8 +16,8 @@ from noninteract_ros.nodes.controller.robot_states import DriverStateCodec
 STAMP = 1_763_790_000_123_456_789
 
 
-def test_torques_stand_in_the_controllers_order_beside_the_stamp() -> None:
-    """Any reader of the message finds the numbers; ours finds the stamp too."""
+def test_torques_are_in_the_order_of_the_controller() -> None:
+    """The data are plain numbers, and the label has the stamp of the answered state."""
     codec = EffortCodec([2, 0, 1])
     for stamp in (0, STAMP):
         message = deserialize_message(
@@ -26,15 +26,15 @@ def test_torques_stand_in_the_controllers_order_beside_the_stamp() -> None:
         assert list(message.data) == [3.5, 1.5, -2.5]
         assert (message.layout.dim[0].size, message.layout.dim[0].stride) == (3, 3)
         assert message.layout.data_offset == 0
-        told, torque = codec.decode(message)
-        assert told == stamp
+        answered, torque = codec.decode(message)
+        assert answered == stamp
         np.testing.assert_array_equal(torque, [1.5, -2.5, 3.5])
 
 
-def test_a_bare_array_says_no_stamp() -> None:
-    """As a person at a terminal sends it."""
-    told, torque = EffortCodec([1, 0]).decode(Float64MultiArray(data=[1.0, 2.0]))
-    assert told is None
+def test_an_array_without_a_label_has_no_stamp() -> None:
+    """Such an array can be published from a terminal."""
+    answered, torque = EffortCodec([1, 0]).decode(Float64MultiArray(data=[1.0, 2.0]))
+    assert answered is None
     np.testing.assert_array_equal(torque, [2.0, 1.0])
 
 
@@ -42,14 +42,14 @@ def test_a_bare_array_says_no_stamp() -> None:
     ("data", "expected"),
     [([1.0], "1 numbers for 2 joints"), ([1.0, float("nan")], "number 1 is nan")],
 )
-def test_wrong_arrays_are_refused(data: list[float], expected: str) -> None:
-    """Whole, with the reason."""
+def test_invalid_arrays_are_rejected(data: list[float], expected: str) -> None:
+    """The error has the reason."""
     with pytest.raises(InputError, match=expected):
         EffortCodec([0, 1]).decode(Float64MultiArray(data=data))
 
 
 def state(**changes: Any) -> bytes:
-    """What joint_state_broadcaster might tell of an arm with a finger."""
+    """Return a message of joint_state_broadcaster for an arm with a finger."""
     fields: dict[str, Any] = {
         "name": ["b", "finger", "a"],
         "position": [2.0, 0.04, 1.0],
@@ -62,13 +62,13 @@ def state(**changes: Any) -> bytes:
     return serialize_message(message)
 
 
-def test_states_are_read_by_name_from_any_message() -> None:
-    """Other joints do not count, whatever they hold; the first message reads as the next ones."""
+def test_states_are_read_by_name() -> None:
+    """Other joints are ignored; the first message reads as the following ones."""
     codec = DriverStateCodec(["a", "b", "c"])
     for data in (state(), state(), state(position=[5.0, 0.0, 4.0]), state()):
-        told = codec.decode(data)
-        assert told is not None
-        stamp, joints, position, velocity, effort = told
+        decoded = codec.decode(data)
+        assert decoded is not None
+        stamp, joints, position, velocity, effort = decoded
         assert stamp == STAMP
         np.testing.assert_array_equal(joints, [1, 0])
         np.testing.assert_array_equal(velocity, [-2.0, -1.0])
@@ -81,8 +81,8 @@ def test_states_are_read_by_name_from_any_message() -> None:
     assert other[4] is None
 
 
-def test_messages_of_other_joints_alone_do_not_count() -> None:
-    """A gripper that speaks on the same topic, without velocities, disturbs nobody."""
+def test_messages_without_joints_of_the_robot_are_ignored() -> None:
+    """A gripper may publish on the same topic, without velocities."""
     codec = DriverStateCodec(["a", "b"])
     gripper = {"name": ["finger"], "position": [0.0], "velocity": [], "effort": []}
     assert codec.decode(state(**gripper)) is None
@@ -100,8 +100,8 @@ def test_messages_of_other_joints_alone_do_not_count() -> None:
         ({"name": ["b", "finger", "b"]}, "joint 'b' is given twice"),
     ],
 )
-def test_wrong_states_are_refused(changes: dict[str, Any], expected: str) -> None:
-    """Whole, with the name of the joint; what comes next is read as ever."""
+def test_invalid_states_are_rejected(changes: dict[str, Any], expected: str) -> None:
+    """The error has the name of the joint, and the next message is read as before."""
     codec = DriverStateCodec(["a", "b"])
     codec.decode(state())
     with pytest.raises(InputError, match=expected):

@@ -126,10 +126,10 @@ def test_a_signal_ends_each_program_cleanly(
 ) -> None:
     """In the middle of a run: status 0, and no trace on the output."""
     values = paper(lockstep=lockstep, rate=200.0)
-    ear = ros.ear(values)
+    monitor = ros.monitor(values)
     for name in NAMES:
         programs.start(name, values)
-    until(lambda: all(ear.says(name, "running")() for name in NAMES), "all run")
+    until(lambda: all(monitor.has_status(name, "running")() for name in NAMES), "all run")
     second = signal.SIGINT if first == signal.SIGTERM else signal.SIGTERM
     for name, number in zip(NAMES, (first, second, second, first), strict=True):
         programs.running[name].send_signal(number)

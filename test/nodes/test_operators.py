@@ -38,10 +38,10 @@ class Bench:
         patient = {"operator": {"hold_timeout": 1.0}}
         values = paper(haptic=None, object=None, lockstep=False, **(patient | changes))
         values["cooperative"]["timeout"] = 0.3
-        self.stack = ros.stack(values).begin()
-        self.ear = self.stack.ear
+        self.stack = ros.stack(values).start()
+        self.monitor = self.stack.monitor
         overrides = [Parameter(k, value=v) for k, v in _flat(self.stack.values)]
-        self.node = ros.node(make(context=ros.context, parameter_overrides=overrides))
+        self.node = ros.add_node(make(context=ros.context, parameter_overrides=overrides))
         self.said: list[tuple[float, Any]] = []
         for kind, topic in ((TwistStamped, "target_twist"), (PoseStamped, "target_pose")):
             ros.probe.create_subscription(kind, f"cooperative/human/{topic}", self._note, 100)
@@ -57,7 +57,7 @@ class Bench:
 
     def place(self) -> np.ndarray:
         """Where the team's middle is."""
-        q = self.ear.newest().position
+        q = self.monitor.newest().position
         assert q is not None
         return 0.5 * (q[:2] + q[2:])
 
@@ -79,7 +79,7 @@ class Bench:
         until(lambda: self.speed() < 1e-3, "rest")
         until(lambda: self.node._releases_left == 0, "the last words")
         count = len(self.said)
-        until(self.ear.renewed(self.node.get_name()))
+        until(self.monitor.has_new_status(self.node.get_name()))
         assert len(self.said) <= count + 1  # One may have been on its way.
 
 
@@ -107,7 +107,7 @@ def test_a_gamepad_leads_while_its_button_is_held(ros: Ros) -> None:
     """Autorepeat at 20 Hz: forward while held, rest on letting go, then silence for others."""
     bench = Bench(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
-    ros.matched(driver)
+    ros.wait_for_subscribers(driver)
     start = bench.place()
     for _ in range(10):  # The stick alone does nothing.
         driver.publish(joy(FORWARD))
@@ -127,7 +127,7 @@ def test_a_gamepad_that_is_cut_off_lets_go_until_it_is_held_anew(ros: Ros) -> No
     """No more messages with the button pressed: rest; they return: still rest, until released."""
     bench = Bench(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
-    ros.matched(driver)
+    ros.wait_for_subscribers(driver)
     held = joy(FORWARD, (ENABLE,))
     bench.publish(driver, held, 20.0, lambda: bench.speed() > 0.15)
     bench.rests()
@@ -145,7 +145,7 @@ def test_a_space_mouse_leads_while_it_is_deflected(ros: Ros, rate: float) -> Non
     """No buttons, nothing at rest, zeros after the last motion."""
     bench = Bench(ros, JoyOperator, **mapping("joy_spacenav"))
     driver = ros.probe.create_publisher(Joy, "/spacenav/joy", 10)
-    ros.matched(driver)
+    ros.wait_for_subscribers(driver)
     deflected = joy([0.0, -0.8, 0.3, 0.0, 0.0, 0.0], count=0)
     bench.publish(driver, deflected, rate, lambda: bench.speed() > 0.1)
     assert (bench.rates()[1:, 1] < 0.0).all()
@@ -157,9 +157,11 @@ def test_a_bad_message_is_refused_and_moves_nothing(ros: Ros) -> None:
     """Two axes are another device's; the diagnostics say so."""
     bench = Bench(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
-    ros.matched(driver)
+    ros.wait_for_subscribers(driver)
     driver.publish(joy([1.0, 1.0], (ENABLE,)))
-    until(lambda: "needs 4" in bench.ear.value("joy_operator", "last rejection"), "the refusal")
+    until(
+        lambda: "needs 4" in bench.monitor.value("joy_operator", "last rejection"), "the refusal"
+    )
     assert not bench.said
 
 
@@ -177,7 +179,7 @@ def test_a_tracker_leads_with_its_clutch_from_where_the_team_is(ros: Ros) -> Non
     bench = Bench(ros, PoseOperator)
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     clutch = ros.probe.create_publisher(Bool, "device/clutch", 10)
-    ros.matched(driver, clutch)
+    ros.wait_for_subscribers(driver, clutch)
     start = bench.place()
     for _ in range(20):
         driver.publish(pose(3.0, 3.0))
@@ -212,7 +214,7 @@ def test_a_tracker_that_jumps_lets_go(ros: Ros) -> None:
     bench = Bench(ros, PoseOperator)
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     clutch = ros.probe.create_publisher(Bool, "device/clutch", 10)
-    ros.matched(driver, clutch)
+    ros.wait_for_subscribers(driver, clutch)
     clutch.publish(Bool(data=True))
     bench.publish(driver, pose(0.0, 0.0), 100.0, lambda: len(bench.said) > 5)
     start = bench.place()
@@ -229,7 +231,7 @@ def test_a_button_is_a_clutch_whose_silence_lets_go(ros: Ros) -> None:
     bench = Bench(ros, PoseOperator, tracker={"joy_topic": "/joy", "clutch_button": 2})
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     gamepad = ros.probe.create_publisher(Joy, "/joy", 10)
-    ros.matched(driver, gamepad)
+    ros.wait_for_subscribers(driver, gamepad)
     start, moved = bench.place(), 0.0
 
     def held(step: float, done: Callable[[], Any]) -> None:
@@ -250,7 +252,7 @@ def test_a_button_is_a_clutch_whose_silence_lets_go(ros: Ros) -> None:
     bench.publish(driver, pose(3.06, 3.0), 100.0, lambda: bench.node._releases_left == 0)
     count = len(bench.said)
     gamepad.publish(joy(REST, (2,)))  # Back, and still pressed: it has to be pressed anew.
-    bench.publish(driver, pose(3.06, 3.0), 100.0, bench.ear.renewed("pose_operator"))
+    bench.publish(driver, pose(3.06, 3.0), 100.0, bench.monitor.has_new_status("pose_operator"))
     assert len(bench.said) <= count + 1
     assert not bench.node.input.clutched
 

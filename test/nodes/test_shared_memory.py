@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Segments in shared memory that killed programs have left behind."""
+"""Removal of shared memory segments left by killed programs."""
 
 import fcntl
 import os
@@ -10,7 +10,7 @@ from noninteract_ros.nodes.stack.shared_memory import MIN_AGE, remove_abandoned
 
 
 def segment(folder: Path, name: str, age: float) -> Path:
-    """A segment with its lock, of an age [s]."""
+    """Create a segment and its lock with an age [s]; return the lock."""
     lock = folder / f"{name}_el"
     (folder / name).touch()
     lock.touch()
@@ -19,7 +19,7 @@ def segment(folder: Path, name: str, age: float) -> Path:
 
 
 def test_only_segments_without_an_owner_are_removed(tmp_path: Path) -> None:
-    """What is held, young, or of another kind stays."""
+    """Segments that are locked, young, or of another kind stay."""
     old = 10 * MIN_AGE
     segment(tmp_path, "fastrtps_0123456789abcdef", old)
     held = segment(tmp_path, "fastrtps_0123456789abcde0", old)

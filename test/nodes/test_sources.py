@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sources' nodes: what they say ahead in lockstep, and at their rate in wall time."""
+"""Nodes of the sources: references ahead in lockstep, at the update rate in wall time."""
 
 from typing import Any
 
@@ -16,43 +16,44 @@ JOINTS = ["robot_1/x", "robot_1/y", "robot_2/x", "robot_2/y"]
 MS = 10**6
 
 
-class Bench:
-    """A source alone, whose states the test gives; it notes what the source says."""
+class SourceMonitor:
+    """Source with states published by the test, and the references it publishes."""
 
     def __init__(self, ros: Ros, name: str, topic: str, element: str, **changes: Any) -> None:
         self.ros = ros
         self._states = JointStateCodec(JOINTS)
         self.codec = SubtaskCodec(topic.split("/")[0], [element], ["x", "y"])
-        self.said: list[ParsedReference | Marker] = []
-        self.ear = ros.ear(paper())
+        self.references: list[ParsedReference | Marker] = []
+        self.monitor = ros.monitor(paper())
         ros.probe.create_subscription(
-            MultiDOFJointTrajectory, f"{topic}/reference", self._note, 100, raw=True
+            MultiDOFJointTrajectory, f"{topic}/reference", self._on_reference, 1000, raw=True
         )
         self._publisher = ros.probe.create_publisher(JointState, "joint_states", 10)
         self.node = ros.make(name, paper(**changes))
-        # Both publishers have both listeners: nothing is said unheard.
-        until(lambda: self._publisher.get_subscription_count() == 2, "two listeners")
-        until(lambda: all(p.get_subscription_count() for p in self._references()), "a listener")
+        until(lambda: self._publisher.get_subscription_count() == 2, "two subscribers")
+        ros.wait_for_subscribers(
+            *(item for item in self.node.publishers if "reference" in item.topic_name)
+        )
 
-    def _references(self) -> list[Any]:
-        return [item for item in self.node.publishers if "reference" in item.topic_name]
-
-    def _note(self, data: bytes) -> None:
-        self.said.append(self.codec.decode(data))
+    def _on_reference(self, data: bytes) -> None:
+        self.references.append(self.codec.decode(data))
 
     def state(self, stamp: int) -> None:
         zeros = np.zeros(4)
         self._publisher.publish(self._states.encode(stamp, zeros, zeros, zeros))
 
     def stamps(self) -> list[tuple[str, int]]:
-        """What was said: references and markers with their stamps."""
-        return [(type(item).__name__, item.stamp_ns) for item in list(self.said)]
+        """Return types and stamps [ns] of the received references and markers."""
+        return [(type(item).__name__, item.stamp_ns) for item in list(self.references)]
 
     def expect(self, *stamps: tuple[str, int]) -> None:
-        """Waits for exactly this to be said, and starts a new list."""
-        until(lambda: len(self.said) >= len(stamps), lambda: f"{stamps}, not {self.stamps()}")
+        """Wait for exactly these references and markers, and clear the list."""
+        until(
+            lambda: len(self.references) >= len(stamps), lambda: f"{stamps}, not {self.stamps()}"
+        )
+        self.ros.drain()
         assert self.stamps() == list(stamps)
-        self.said.clear()
+        self.references.clear()
 
 
 def reference(ms: int) -> tuple[str, int]:
@@ -63,64 +64,64 @@ def marker(ms: int) -> tuple[str, int]:
     return ("Marker", ms * MS)
 
 
-def test_a_source_speaks_one_tick_ahead_and_says_when_it_will_be_silent(ros: Ros) -> None:
-    """A marker covers the silence before the start; then each tick has its reference."""
-    bench = Bench(ros, "haptic_emulator", "cooperative/human", "cooperative")
-    bench.state(0)
-    bench.expect(marker(49))
+def test_a_source_publishes_one_tick_ahead(ros: Ros) -> None:
+    """A marker covers the time before the start; then each tick has its reference."""
+    source = SourceMonitor(ros, "haptic_emulator", "cooperative/human", "cooperative")
+    source.state(0)
+    source.expect(marker(49))
     for ms in range(1, 49):
-        bench.state(ms * MS)
-    bench.state(49 * MS)
-    bench.expect(reference(50))
-    bench.state(50 * MS)
-    bench.expect(reference(51))
+        source.state(ms * MS)
+    source.state(49 * MS)
+    source.expect(reference(50))
+    source.state(50 * MS)
+    source.expect(reference(51))
 
 
-def test_a_slow_source_bridges_its_ticks_with_markers(ros: Ros) -> None:
-    """At 100 Hz and 1 kHz: a reference, then a marker up to the tick before the next one."""
-    bench = Bench(ros, "relative_planner", "relative/autonomy", "robot_1-robot_2")
-    bench.state(0)
-    bench.expect(reference(0), marker(9))
+def test_a_slow_source_publishes_markers_between_references(ros: Ros) -> None:
+    """At 100 Hz and 1 kHz a marker covers the ticks up to the next reference."""
+    source = SourceMonitor(ros, "relative_planner", "relative/autonomy", "robot_1-robot_2")
+    source.state(0)
+    source.expect(reference(0), marker(9))
     for ms in range(1, 10):
-        bench.state(ms * MS)
-    bench.expect(reference(10), marker(19))
+        source.state(ms * MS)
+    source.expect(reference(10), marker(19))
 
 
-def test_what_holds_for_a_state_is_said_again_with_it(ros: Ros) -> None:
-    """A controller that was started anew hears from each source what it waits for."""
-    bench = Bench(ros, "relative_planner", "relative/autonomy", "robot_1-robot_2")
-    bench.state(0)
-    bench.expect(reference(0), marker(9))
-    bench.state(0)
-    bench.expect(reference(0), marker(9))
-    bench.state(5 * MS)
-    bench.state(5 * MS)
-    bench.expect(marker(9))
+def test_references_are_resent_with_their_state(ros: Ros) -> None:
+    """A restarted controller receives the references that it waits for."""
+    source = SourceMonitor(ros, "relative_planner", "relative/autonomy", "robot_1-robot_2")
+    source.state(0)
+    source.expect(reference(0), marker(9))
+    source.state(0)
+    source.expect(reference(0), marker(9))
+    source.state(5 * MS)
+    source.state(5 * MS)
+    source.expect(marker(9))
 
 
-def test_a_team_that_starts_anew_is_spoken_to_from_the_start(ros: Ros) -> None:
-    """Time that goes back after a silence is a new run; without a silence it is refused."""
-    bench = Bench(ros, "relative_planner", "relative/autonomy", "robot_1-robot_2")
-    bench.state(700 * MS)
-    bench.expect(reference(700), marker(709))
-    bench.state(0)
+def test_references_restart_with_the_team(ros: Ros) -> None:
+    """Stamps that go back after a silence are a restart; without a silence they are rejected."""
+    source = SourceMonitor(ros, "relative_planner", "relative/autonomy", "robot_1-robot_2")
+    source.state(700 * MS)
+    source.expect(reference(700), marker(709))
+    source.state(0)
 
-    def begins_anew() -> bool:
-        bench.state(0)
-        return len(bench.said) >= 2
+    def restarted() -> bool:
+        source.state(0)
+        return len(source.references) >= 2
 
-    def refusal() -> bool:
-        return "goes back" in bench.ear.value("relative_planner", "last rejection")
+    def rejected() -> bool:
+        return "goes back" in source.monitor.value("relative_planner", "last rejection")
 
-    until(refusal, "the refusal")
-    until(bench.ear.says("relative_planner", "no states from the team"), "the silence is noticed")
-    until(begins_anew, "a new start")
-    assert bench.stamps()[:2] == [reference(0), marker(9)]
+    until(rejected, "the rejection")
+    source.monitor.wait_for_status("relative_planner", "no states from the team")
+    until(restarted, "the restart")
+    assert source.stamps()[:2] == [reference(0), marker(9)]
 
 
-def test_in_wall_time_a_source_speaks_while_the_team_is_there(ros: Ros) -> None:
-    """References carry the source's clock and its own motion; they end with the states."""
-    bench = Bench(
+def test_a_source_publishes_in_wall_time_while_it_receives_states(ros: Ros) -> None:
+    """References have the clock and motion of the source, and end with the states."""
+    source = SourceMonitor(
         ros,
         "haptic_emulator",
         "cooperative/human",
@@ -129,21 +130,25 @@ def test_in_wall_time_a_source_speaks_while_the_team_is_there(ros: Ros) -> None:
         haptic={"update_rate": 100.0, "start_time": 0.0},
     )
 
-    def team() -> bool:
-        bench.state(ros.probe.get_clock().now().nanoseconds)
-        return len(bench.said) >= 30
+    def publish_state() -> None:
+        source.state(ros.probe.get_clock().now().nanoseconds)
 
-    until(team, "30 references")
-    until(bench.ear.says("haptic_emulator", "no states from the team"), "the silence is noticed")
-    count = len(bench.said)
-    until(bench.ear.renewed("haptic_emulator"))
-    assert len(bench.said) == count
-    stamps = np.array([item.stamp_ns for item in bench.said]) / 1e9
-    first = bench.said[0]
+    def received(count: int) -> bool:
+        publish_state()
+        return len(source.references) >= count
+
+    until(lambda: received(30), "30 references")
+    source.monitor.wait_for_status("haptic_emulator", "no states from the team")
+    count = int(source.monitor.value("haptic_emulator", "references sent"))
+    resumed = ros.probe.get_clock().now().nanoseconds
+    until(lambda: received(count + 1), "references after the silence")
+    assert source.references[count].stamp_ns > resumed
+    stamps = np.array([item.stamp_ns for item in source.references]) / 1e9
+    first = source.references[0]
     assert isinstance(first, ParsedReference)
     np.testing.assert_allclose(first.position, [0.0, 1.0], atol=0.05)
     assert (np.diff(stamps) > 0.0).all()
-    for item in bench.said:
+    for item in source.references:
         assert isinstance(item, ParsedReference)
         assert item.velocity is not None
         assert item.acceleration is not None

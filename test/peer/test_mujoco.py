@@ -127,18 +127,18 @@ def test_mujoco_over_dds_agrees_with_the_rehearsal_and_stays_decoupled(
 ) -> None:
     """Both bounds hold over five seconds of the real programs with MuJoCo as plant."""
     values = calm()
-    ear = ros.ear(values)
+    monitor = ros.monitor(values)
     file = programs.write(values)
     plant = programs.python("mujoco_team", str(EXAMPLE), str(file))
-    until(lambda: ear.states, "the first state of MuJoCo")
+    until(lambda: monitor.states, "the first state of MuJoCo")
     for name in SOURCES:
         programs.start(name, values)
     assert plant.wait(300.0) == 0, programs.log("mujoco_team")
-    until(lambda: ear.now >= 5.0, "the last state of MuJoCo")
+    until(lambda: monitor.now >= 5.0, "the last state of MuJoCo")
 
     scenario = Scenario.from_dict(values)
     expected = rehearse(scenario, 5.001)
-    t, q, v, _ = ear.history(ear.states)
+    t, q, v, _ = monitor.history(monitor.states)
     assert len(t) == len(expected.t) == 5001
     assert largest(q - expected.q) < BOUND
     assert largest(q - q[0]) > 0.1
