@@ -27,7 +27,7 @@ PUSH = np.array([25.0, -20.0, 0.0, 0.0, 0.0, 0.0])
 SOFT = ImpedanceSettings((80.0,), (25.0,))
 
 
-class Loop:
+class DelayedLoop:
     """Two unlike arms under gravity, one of them pushed for 0.2 s, with commands that come late.
 
     Args:
@@ -103,7 +103,7 @@ class Loop:
 @pytest.mark.parametrize("rate", [100.0, 250.0, 1000.0])
 def test_the_account_balances_at_any_rate(rate):
     """What the push did is what the account infers, to the integrator; W grows by no more."""
-    loop = Loop(rate)
+    loop = DelayedLoop(rate)
     loop.run(0.6)
     account = loop.answer().account
     assert account.received == pytest.approx(loop.received(), abs=3e-6 * (1000.0 / rate) ** 3)
@@ -116,7 +116,7 @@ def test_the_account_balances_at_any_rate(rate):
 @pytest.mark.parametrize(("delay", "loss"), [(0, 0.05), (1, 0.0), (3, 0.0), (10, 0.0)])
 def test_the_torque_that_was_applied_is_accounted_for(delay, loss):
     """Late commands and lost states are inside the account: the ledger's work is still met."""
-    loop = Loop(delay=delay, loss=loss, damping=1.0)
+    loop = DelayedLoop(delay=delay, loss=loss, damping=1.0)
     loop.run(0.6)
     account = loop.answer().account
     assert account.received == pytest.approx(loop.received(), abs=1e-5)
@@ -126,7 +126,7 @@ def test_the_torque_that_was_applied_is_accounted_for(delay, loss):
 
 def test_the_last_command_would_not_do():
     """With commands three ticks late, taking the last one for the applied one misses the work."""
-    loop = Loop(delay=3, damping=1.0)
+    loop = DelayedLoop(delay=3, damping=1.0)
     loop._reports = False
     loop.run(0.6)
     assert abs(loop.answer().account.received - loop.received()) > 1e-3
@@ -135,7 +135,7 @@ def test_the_last_command_would_not_do():
 def test_open_gates_give_the_noninteracting_torque_to_the_bit():
     """A push that the tank can pay for changes no bit of any torque."""
     laws = ("energy_gated", "noninteracting")
-    gated, plain = (Loop(law=law, damping=1.0, push=0.3).run(0.5) for law in laws)
+    gated, plain = (DelayedLoop(law=law, damping=1.0, push=0.3).run(0.5) for law in laws)
     for a, b in zip(gated, plain, strict=True):
         assert a.account.tank.sigma == 1.0
         np.testing.assert_array_equal(a.torque, b.torque)
@@ -145,7 +145,7 @@ def test_open_gates_give_the_noninteracting_torque_to_the_bit():
 def test_half_open_gates_are_the_same_robot_by_robot(name):
     """Dense and structured, with sigma and grip between 0 and 1, ask for one acceleration."""
     pair, found = Pair(name, 0), []
-    tank = Loop().core.gate.tank
+    tank = DelayedLoop().core.gate.tank
     tank = replace(tank, sigma=0.4, grip=0.7)
     for seen in (pair.structured, pair.dense):
         arguments = (seen.dynamics, pair.error, pair.impedance)
@@ -165,7 +165,7 @@ def test_gates_mix_both_laws_with_the_springs_and_dampers_in_force(sigma, grip):
     """sigma of noninteracting, the rest natural, both with nu of the stiffness and damping."""
     pair = Pair("star of 8", 0)
     dynamics, error, impedance = pair.dense.dynamics, pair.error, pair.impedance
-    tank = replace(Loop().core.gate.tank, sigma=sigma, grip=grip)
+    tank = replace(DelayedLoop().core.gate.tank, sigma=sigma, grip=grip)
     added = decoupling(dynamics, error, impedance)
     found = gated_acceleration(dynamics, error, added, tank.sigma, tank.grip)
     assert np.isinf(impedance.max_force).all()  # So that a share of the stiffness is one of h.
@@ -181,7 +181,7 @@ def test_gates_mix_both_laws_with_the_springs_and_dampers_in_force(sigma, grip):
 
 def test_references_that_jump_leave_the_gates_open():
     """Free motion of unlike arms after jumps of a reference, with little more than a full gate."""
-    loop = Loop(damping=0.2)
+    loop = DelayedLoop(damping=0.2)
     gate, zero = loop.core.gate, np.zeros(2)
     gate.settings = replace(gate.settings, initial=0.3, refill_fraction=0.0)
     gate.restart()
@@ -201,7 +201,7 @@ def test_references_that_jump_leave_the_gates_open():
 
 def test_a_change_of_law_begins_a_fresh_account_without_a_bump():
     """Turned on, the gated law begins with its initial energy, from the torque in force."""
-    loop, same = Loop(law="natural"), Loop(law="natural")
+    loop, same = DelayedLoop(law="natural"), DelayedLoop(law="natural")
     for item in (loop, same):
         item.run(0.1)
     number = loop.tick.account.number
@@ -215,7 +215,7 @@ def test_a_change_of_law_begins_a_fresh_account_without_a_bump():
 
 def test_stiffer_springs_wait_until_they_are_paid():
     """A stiffness whose energy is not there comes in part, says so, and whole after a refill."""
-    loop = Loop(damping=1.0)
+    loop = DelayedLoop(damping=1.0)
     loop.run(0.2)
     loop.simulation.v *= 0.0  # Held where it is, as against a stop.
     core, settings = loop.core, loop.core.gate.settings
@@ -245,7 +245,7 @@ def test_stiffer_springs_wait_until_they_are_paid():
 
 def test_a_stop_is_no_loss_to_the_tank():
     """The damping of a stop is booked as damping: the tank has no less after it."""
-    loop = Loop(damping=1.0)
+    loop = DelayedLoop(damping=1.0)
     loop.run(0.15)
     loop.core.stop()
     loop.run(1.0, push=False)

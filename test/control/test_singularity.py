@@ -58,7 +58,7 @@ def controller(given: Team, law: str = "noninteracting", **keys) -> TeamControll
     return TeamController(given, stack_of(given), law, impedances, inputs, **keys)
 
 
-class Loop:
+class SingularityLoop:
     """A team with its controller at 1 kHz, its mean led to and fro by the human."""
 
     def __init__(self, given: Team, law: str = "noninteracting", **keys) -> None:
@@ -79,7 +79,7 @@ class Loop:
         return self.controller.step(self.simulation.now, self.simulation.q, self.simulation.v)
 
 
-def led(loop: Loop, ticks: int, goal: tuple[float, float]) -> list:
+def led(loop: SingularityLoop, ticks: int, goal: tuple[float, float]) -> list:
     """The mean led from where it is to a goal, smoothly."""
     start = loop.controller.stack.evaluate(
         loop.controller.team.state(loop.simulation.q, loop.simulation.v)
@@ -178,7 +178,7 @@ def test_an_exactly_singular_team_gets_a_finite_torque(law, count):
 @pytest.mark.parametrize("law", LAWS)
 def test_a_team_led_out_of_reach_waits_and_comes_back_by_itself(law):
     """It never turns over, holds still near the singularity, and tracks again in the end."""
-    loop = Loop(team(), law)
+    loop = SingularityLoop(team(), law)
     start = loop.tick().task.x[:2]
     ticks = led(loop, 3000, (0.0, 1.3))
     ticks += [loop.tick(np.array([0.0, 1.3])) for _ in range(1500)]
@@ -195,9 +195,9 @@ def test_a_team_led_out_of_reach_waits_and_comes_back_by_itself(law):
     assert np.abs(np.diff(torques, axis=0)).max() < 4.0
 
 
-def near_singularity(law: str = "noninteracting") -> Loop:
+def near_singularity(law: str = "noninteracting") -> SingularityLoop:
     """A team that the human holds out of reach, in motion."""
-    loop = Loop(team(), law)
+    loop = SingularityLoop(team(), law)
     led(loop, 1200, (0.0, 1.3))
     ticks = [loop.tick(np.array([0.0, 1.3])) for _ in range(400)]
     assert 0.0 < ticks[-1].law_share < 1.0
@@ -239,7 +239,7 @@ def test_changes_of_law_near_a_singularity_have_no_torque_step(law):
     np.testing.assert_allclose(changed.tick(goal).torque, same.tick(goal).torque, atol=1e-9)
     ticks = [changed.tick(goal) for _ in range(1000)]
     assert np.abs(np.diff([tick.torque for tick in ticks], axis=0)).max() < 1.0
-    gone = Loop(team(start=((0.4, 0.0), (0.4, 0.0))))
+    gone = SingularityLoop(team(start=((0.4, 0.0), (0.4, 0.0))))
     gone.tick()
     gone.controller.set_law(law)
     gone.controller.stop()
@@ -249,8 +249,8 @@ def test_changes_of_law_near_a_singularity_have_no_torque_step(law):
 STRETCHED = np.array([0.4, 0.0, 2.5, 0.0])
 
 
-def jumped_into_a_singularity(**keys) -> Loop:
-    loop = Loop(team(), **keys)
+def jumped_into_a_singularity(**keys) -> SingularityLoop:
+    loop = SingularityLoop(team(), **keys)
     for _ in range(50):
         loop.tick()
     loop.simulation.q = STRETCHED.copy()
@@ -278,7 +278,7 @@ def test_a_team_that_starts_in_a_singularity_can_be_led():
     """It need not have been regular before, and finds the same way in every run."""
     runs = []
     for _ in range(2):
-        loop = Loop(team(start=((0.4, 0.0), (2.5, 0.0))))
+        loop = SingularityLoop(team(start=((0.4, 0.0), (2.5, 0.0))))
         for _ in range(500):
             loop.tick()
         runs.append(led(loop, 2500, (0.0, 0.2)))
@@ -301,7 +301,7 @@ def test_a_stop_ends_the_way_out():
 def test_the_way_out_stays_within_joint_limits():
     """A joint at its limit is not led beyond it, whatever would be more regular there."""
     given = team(start=((0.4, 0.0), (2.5, 0.0)), lower_limit=(-3.0, -0.02), upper_limit=(3.0, 0.4))
-    loop = Loop(given)
+    loop = SingularityLoop(given)
     q = np.array([loop.tick().state.q for _ in range(1000)])
     assert q[:, [1, 3]].min() > -0.02
     assert q[:, [1, 3]].max() <= 0.4
@@ -310,7 +310,7 @@ def test_the_way_out_stays_within_joint_limits():
 
 def test_a_team_put_into_a_singularity_is_held_where_it_may_not_move_out():
     """Without the escape the team stands where it was put."""
-    loop = Loop(team(), safety=SafetySettings(singularity_escape=False))
+    loop = SingularityLoop(team(), safety=SafetySettings(singularity_escape=False))
     for _ in range(50):
         loop.tick()
     loop.simulation.q = np.array([0.4, 0.0, 2.5, 0.0])
@@ -336,7 +336,7 @@ def test_a_jump_out_of_a_singularity_starts_anew():
 def test_torque_rate_holds_across_a_jump_of_the_state():
     """The torque of a team that is put elsewhere changes as slowly as ever."""
     given = team(effort_limit=(20.0, 10.0), plane="xz")
-    loop = Loop(given, safety=SafetySettings(torque_rate=200.0))
+    loop = SingularityLoop(given, safety=SafetySettings(torque_rate=200.0))
     torques = [loop.tick(np.array([0.0, 0.9])).torque for _ in range(100)]
     loop.simulation.q = np.array([0.4, 1.6, 2.5, -1.6])
     torques += [loop.tick().torque for _ in range(300)]
@@ -348,7 +348,7 @@ def test_torque_rate_holds_across_a_jump_of_the_state():
 
 def test_a_gap_between_states_counts_for_the_torque_rate():
     """After 0.3 s without states the torque may be 60 N m from its last, and is at once."""
-    loop = Loop(team(plane="xz"), safety=SafetySettings(torque_rate=200.0))
+    loop = SingularityLoop(team(plane="xz"), safety=SafetySettings(torque_rate=200.0))
     loop.tick()
     core = loop.controller
     q = core.team.q0 + 0.05
@@ -361,7 +361,7 @@ def test_a_gap_between_states_counts_for_the_torque_rate():
 def test_inputs_beyond_all_numbers_leave_the_torque_finite():
     """References of 1e200 and velocities of 1e160 overflow the law; brakes take over."""
     for v in (np.zeros(4), np.array([1e160, 0.0, 0.0, 0.0])):
-        loop = Loop(team(effort_limit=(20.0, 10.0)))
+        loop = SingularityLoop(team(effort_limit=(20.0, 10.0)))
         loop.tick()
         core = loop.controller
         huge = np.full(2, 1e200)
@@ -379,7 +379,7 @@ def test_inputs_beyond_all_numbers_leave_the_torque_finite():
 
 def test_a_law_that_fails_brakes_and_is_reported(monkeypatch):
     """Not a number from a subtask of one's own, or from a bug: gravity and brakes, and back."""
-    loop = Loop(team(plane="xz"))
+    loop = SingularityLoop(team(plane="xz"))
     for _ in range(20):
         loop.tick()
     core = loop.controller
@@ -399,7 +399,7 @@ def test_a_law_that_fails_brakes_and_is_reported(monkeypatch):
 
 def test_a_rate_input_out_of_reach_is_survived():
     """A joystick that is held away from the team for seconds does no harm."""
-    loop = Loop(team())
+    loop = SingularityLoop(team())
     torques = []
     for _ in range(4000):
         now = loop.simulation.now

@@ -30,7 +30,7 @@ RELATIVE = ImpedanceSettings((50.0,), (25.0,))
 COOPERATIVE, APART = slice(0, 2), slice(2, 4)
 
 
-class Loop:
+class ArmsLoop:
     """Two unlike planar arms in a vertical plane with their controller, at 1 kHz.
 
     Args:
@@ -88,7 +88,7 @@ def torques(ticks: list[Tick]) -> np.ndarray:
 
 def test_first_torque_holds_the_team():
     """Without input the team is held where it stands, by its gravity torque, and stays."""
-    loop = Loop()
+    loop = ArmsLoop()
     first = loop.tick()
     assert first.restarted == "the first state"
     np.testing.assert_allclose(first.torque, loop.team.gravity(loop.team.q0), atol=1e-12)
@@ -99,7 +99,7 @@ def test_first_torque_holds_the_team():
 
 def test_torque_is_the_law_s():
     """The torque is M S (a - J_rate v) + C v + g for the commanded task acceleration."""
-    loop = Loop()
+    loop = ArmsLoop()
     tick = loop.run(300, (0.1, 0.06))[-1]
     state, v = tick.state, tick.state.v
     acceleration = np.linalg.solve(tick.task.J, tick.task_acceleration - tick.task.J_rate @ v)
@@ -110,7 +110,7 @@ def test_torque_is_the_law_s():
 
 def test_a_led_subtask_moves_no_other():
     """A human motion of the mean leaves the arms' distance to what one tick's hold costs."""
-    loop = Loop()
+    loop = ArmsLoop()
     ticks = loop.run(600, (0.1, 0.06))
     moved = ticks[-1].task.x - ticks[0].task.x
     assert np.abs(moved[COOPERATIVE]).min() > 0.02
@@ -120,7 +120,7 @@ def test_a_led_subtask_moves_no_other():
 
 def test_input_without_authority_leaves_torques_bit_equal():
     """Inputs of every kind from the source without authority change no bit of any torque."""
-    alone, disturbed = Loop(), Loop()
+    alone, disturbed = ArmsLoop(), ArmsLoop()
     found = []
     for loop in (alone, disturbed):
         ticks = []
@@ -151,9 +151,9 @@ CHANGES = [
 ]
 
 
-def disturbed_loop(**keys) -> Loop:
+def disturbed_loop(**keys) -> ArmsLoop:
     """A loop in full motion, with errors in both subtasks and a force input."""
-    loop = Loop(**keys)
+    loop = ArmsLoop(**keys)
     loop.say(Force(np.array([2.0, -3.0])))
     loop.simulation.push("arm_1", np.array([6.0, 3.0, 0.0, 0.0, 0.0, 0.0]), False, 0.1)
     loop.run(150, (0.1, 0.06))
@@ -263,7 +263,7 @@ def test_stop_is_latched():
 
 def test_inputs_do_not_pile_up_during_a_stop():
     """What comes due during a stop is taken off the queue, of both sources."""
-    loop = Loop()
+    loop = ArmsLoop()
     loop.controller.stop()
     loop.run(50, (0.1, 0.1))
     assert all(
@@ -296,7 +296,7 @@ def test_resume_has_no_torque_step_and_holds_where_it_is(ticks):
 
 def test_inputs_from_before_a_resume_are_forgotten():
     """A reference given during the stop does not start a motion at the resume."""
-    loop = Loop()
+    loop = ArmsLoop()
     loop.controller.stop()
     loop.run(5, (0.1, 0.06))
     loop.controller.resume()
@@ -320,7 +320,7 @@ def test_a_team_put_elsewhere_starts_anew():
 @pytest.mark.parametrize("stops", [True, False])
 def test_a_team_put_back_is_pushed_by_nothing_of_before(stops):
     """However near its start is: no reference, no fading torque and no account goes on."""
-    loop = Loop()
+    loop = ArmsLoop()
     loop.run(60, (0.1, 0.06))
     spent = loop.controller.gate.account.number
     if stops:
@@ -339,7 +339,7 @@ def test_a_team_put_back_is_pushed_by_nothing_of_before(stops):
 
 def test_a_fast_team_seen_seldom_has_not_jumped():
     """A joint that moves as its velocity says has not been put elsewhere."""
-    loop = Loop()
+    loop = ArmsLoop()
     loop.tick()
     v = np.array([3.0, 0.0, 0.0, 0.0])
     tick = loop.controller.step(0.101, loop.team.q0 + 0.1 * v, v)

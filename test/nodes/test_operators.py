@@ -29,7 +29,7 @@ FORWARD = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
 REST = [0.0] * 6
 
 
-class Bench:
+class OperatorHarness:
     """A team in wall time without a human, one operator's program and the device's driver."""
 
     def __init__(self, ros: Ros, make: Callable[..., Any], **changes: Any) -> None:
@@ -105,7 +105,7 @@ def joy(axes: list[float], pressed: tuple[int, ...] = (), count: int = 21) -> Jo
 
 def test_a_gamepad_leads_while_its_button_is_held(ros: Ros) -> None:
     """Autorepeat at 20 Hz: forward while held, rest on letting go, then silence for others."""
-    bench = Bench(ros, JoyOperator, **mapping("joy_gamepad"))
+    bench = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.wait_for_subscribers(driver)
     start = bench.place()
@@ -125,7 +125,7 @@ def test_a_gamepad_leads_while_its_button_is_held(ros: Ros) -> None:
 
 def test_a_gamepad_that_is_cut_off_lets_go_until_it_is_held_anew(ros: Ros) -> None:
     """No more messages with the button pressed: rest; they return: still rest, until released."""
-    bench = Bench(ros, JoyOperator, **mapping("joy_gamepad"))
+    bench = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.wait_for_subscribers(driver)
     held = joy(FORWARD, (ENABLE,))
@@ -143,7 +143,7 @@ def test_a_gamepad_that_is_cut_off_lets_go_until_it_is_held_anew(ros: Ros) -> No
 @pytest.mark.parametrize("rate", [60.0, 500.0], ids=["as its events come", "in a flood"])
 def test_a_space_mouse_leads_while_it_is_deflected(ros: Ros, rate: float) -> None:
     """No buttons, nothing at rest, zeros after the last motion."""
-    bench = Bench(ros, JoyOperator, **mapping("joy_spacenav"))
+    bench = OperatorHarness(ros, JoyOperator, **mapping("joy_spacenav"))
     driver = ros.probe.create_publisher(Joy, "/spacenav/joy", 10)
     ros.wait_for_subscribers(driver)
     deflected = joy([0.0, -0.8, 0.3, 0.0, 0.0, 0.0], count=0)
@@ -155,7 +155,7 @@ def test_a_space_mouse_leads_while_it_is_deflected(ros: Ros, rate: float) -> Non
 
 def test_a_bad_message_is_refused_and_moves_nothing(ros: Ros) -> None:
     """Two axes are another device's; the diagnostics say so."""
-    bench = Bench(ros, JoyOperator, **mapping("joy_gamepad"))
+    bench = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.wait_for_subscribers(driver)
     driver.publish(joy([1.0, 1.0], (ENABLE,)))
@@ -176,7 +176,7 @@ def pose(x: float, y: float, frame: str = "phantom_base") -> PoseStamped:
 
 def test_a_tracker_leads_with_its_clutch_from_where_the_team_is(ros: Ros) -> None:
     """Device at 3 m, team at 0: taking hold moves nothing, moving by 6 cm moves it by 6 cm."""
-    bench = Bench(ros, PoseOperator)
+    bench = OperatorHarness(ros, PoseOperator)
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     clutch = ros.probe.create_publisher(Bool, "device/clutch", 10)
     ros.wait_for_subscribers(driver, clutch)
@@ -211,7 +211,7 @@ def test_a_tracker_leads_with_its_clutch_from_where_the_team_is(ros: Ros) -> Non
 
 def test_a_tracker_that_jumps_lets_go(ros: Ros) -> None:
     """A pose half a metre away in one message is a glitch: refused, the clutch lets go."""
-    bench = Bench(ros, PoseOperator)
+    bench = OperatorHarness(ros, PoseOperator)
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     clutch = ros.probe.create_publisher(Bool, "device/clutch", 10)
     ros.wait_for_subscribers(driver, clutch)
@@ -228,7 +228,7 @@ def test_a_tracker_that_jumps_lets_go(ros: Ros) -> None:
 
 def test_a_button_is_a_clutch_whose_silence_lets_go(ros: Ros) -> None:
     """Autorepeat at 20 Hz; a gamepad that is cut off while poses go on holds nothing any more."""
-    bench = Bench(ros, PoseOperator, tracker={"joy_topic": "/joy", "clutch_button": 2})
+    bench = OperatorHarness(ros, PoseOperator, tracker={"joy_topic": "/joy", "clutch_button": 2})
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     gamepad = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.wait_for_subscribers(driver, gamepad)
@@ -276,7 +276,7 @@ def test_a_key_leads_while_it_repeats_and_space_stops(ros: Ros) -> None:
     """As a terminal repeats: at once, after half a second, then 30 times a second."""
     keys = Keys()
     before = termios.tcgetattr(keys.terminal)
-    bench = Bench(ros, keys.make)
+    bench = OperatorHarness(ros, keys.make)
     keys.strike("d")
     time.sleep(0.5)  # What the keyboard waits before it repeats.
     end = time.monotonic() + DEADLINE

@@ -37,8 +37,8 @@ def lead(subtask: str, *velocity: float) -> Act:
 
     def act(rehearsal: Rehearsal) -> None:
         now = rehearsal.simulation.now
-        heard = rehearsal.controller.inputs[subtask].sources["human"]
-        heard.receive(now, Rate(np.array(velocity)), now)
+        source = rehearsal.controller.inputs[subtask].sources["human"]
+        source.receive(now, Rate(np.array(velocity)), now)
 
     return act
 
@@ -99,13 +99,17 @@ def measured(
     acts: Mapping[float, Act],
     tamper: Tamper | None = None,
 ) -> tuple[Recorded, dict[str, Check]]:
-    told = {"changed parameters": "cooperative.stiffness" if stiffer in acts.values() else "none"}
+    values_reported = {
+        "changed parameters": "cooperative.stiffness" if stiffer in acts.values() else "none"
+    }
 
-    def tell(writer: RunWriter) -> None:
-        said = to_diagnostics(1, [to_status("/team/controller", Level.OK, "running", told)])
-        writer.add("/diagnostics", DIAGNOSTICS, 2, 2, serialize_message(said))
+    def add_status(writer: RunWriter) -> None:
+        message = to_diagnostics(
+            1, [to_status("/team/controller", Level.OK, "running", values_reported)]
+        )
+        writer.add("/diagnostics", DIAGNOSTICS, 2, 2, serialize_message(message))
 
-    recorded = Recorded(record(folder, values, 3.0, tamper, tell, acts))
+    recorded = Recorded(record(folder, values, 3.0, tamper, add_status, acts))
     found = measure(recorded, other_laws=False)
     return recorded, {check.name: check for check in found.checks}
 
@@ -153,9 +157,9 @@ def test_only_transitions_stops_and_resets_are_excluded(
 
 def without_interventions(recorded: Recorded, t: np.ndarray) -> np.ndarray:
     """Return True at times without interventions within 20 ms."""
-    told = recorded.energy_entry("cooperative", "interventions")
-    assert told is not None
-    counts = np.interp(t - 0.02, *told), np.interp(t + 0.02, *told)
+    entry = recorded.energy_entry("cooperative", "interventions")
+    assert entry is not None
+    counts = np.interp(t - 0.02, *entry), np.interp(t + 0.02, *entry)
     return np.asarray(counts[0] == counts[1])
 
 
@@ -189,9 +193,9 @@ def test_a_reset_is_no_motion(session: tuple[Recorded, dict[str, Check]]) -> Non
 def test_authority_is_recorded(session: tuple[Recorded, dict[str, Check]]) -> None:
     """It is `hold` before the first input and after its timeout."""
     recorded, _ = session
-    told = recorded.energy_entry("cooperative", "leader")
-    assert told is not None
-    leader = dict(zip(np.round(told[0], 3).tolist(), told[1].astype(int).tolist(), strict=True))
+    entry = recorded.energy_entry("cooperative", "leader")
+    assert entry is not None
+    leader = dict(zip(np.round(entry[0], 3).tolist(), entry[1].astype(int).tolist(), strict=True))
     assert AUTHORITIES[leader[0.04]] == "hold"
     assert AUTHORITIES[leader[0.4]] == "human"
     assert AUTHORITIES[leader[0.72]] == "hold"

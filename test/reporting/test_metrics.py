@@ -237,11 +237,11 @@ def test_changes_at_run_time_are_named(
 ) -> None:
     """Controller diagnostics show that a run left its scenario."""
 
-    def tell(writer: RunWriter) -> None:
-        said = to_diagnostics(1, [to_status("/team/controller", Level.OK, message, values)])
-        writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(said))
+    def add_status(writer: RunWriter) -> None:
+        array = to_diagnostics(1, [to_status("/team/controller", Level.OK, message, values)])
+        writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(array))
 
-    run = record(tmp_path, scenario_values(), 0.1, extra=tell)
+    run = record(tmp_path, scenario_values(), 0.1, extra=add_status)
     (found,) = measure(Recorded(run), other_laws=False).metrics["run"]["external_influences"]
     assert text in found
 
@@ -249,8 +249,8 @@ def test_changes_at_run_time_are_named(
 def test_diagnostics_are_summed_up(tmp_path: Path) -> None:
     """They contain worst and last level and rejected inputs; lost messages fail their check."""
 
-    def tell(writer: RunWriter) -> None:
-        said = [
+    def add_status(writer: RunWriter) -> None:
+        statuses = [
             (
                 Level.WARN,
                 "/team/robot_team",
@@ -259,11 +259,11 @@ def test_diagnostics_are_summed_up(tmp_path: Path) -> None:
             (Level.OK, "/team/robot_team", {"rejected inputs": 3}),
             (Level.WARN, "/team/recorder", {"lost": 4}),
         ]
-        for level, name, values in said:
+        for level, name, values in statuses:
             message = to_diagnostics(1, [to_status(name, level, "text", values)])
             writer.add("/diagnostics", DIAGNOSTICS, 1, 1, serialize_message(message))
 
-    run = record(tmp_path, scenario_values(), 0.1, extra=tell)
+    run = record(tmp_path, scenario_values(), 0.1, extra=add_status)
     found = measure(Recorded(run), other_laws=False)
     assert found.metrics["diagnostics"]["/team/robot_team"] == {
         "worst_level": "WARN",

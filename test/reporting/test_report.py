@@ -81,7 +81,7 @@ def test_a_missing_recording_is_rejected(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "reason"),
     [
         (None, "no run.mcap in this folder"),
         (b"", "is empty"),
@@ -95,7 +95,7 @@ def test_an_unreadable_recording_gives_one_line_and_exit_status_2(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     content: bytes | str | None,
-    said: str,
+    reason: str,
 ) -> None:
     """The line names the file and the error."""
     file = tmp_path / "run.mcap"
@@ -110,7 +110,7 @@ def test_an_unreadable_recording_gives_one_line_and_exit_status_2(
     assert cli.main() == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"noninteract: {tmp_path}")
-    assert said in line
+    assert reason in line
 
 
 def test_errors_have_their_own_units(tmp_path: Path) -> None:
