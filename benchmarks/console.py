@@ -22,9 +22,10 @@ from typing import Any
 
 import numpy as np
 import rclpy
-from noninteract_ros.nodes.recording.raw_subscription import RawSubscription
 from playwright.sync_api import Page, sync_playwright
 from rclpy.node import Node
+
+from noninteract_ros.nodes.recording.raw_subscription import RawSubscription
 
 DRAGS = 20
 DURATION = 10.0  # [s] over which frames and CPU time are measured
