@@ -33,12 +33,12 @@ def main() -> None:
         impedance = stack_impedance(stack.subtasks, changed)
         dynamics = task_dynamics(state, task, stack.slices, impedance.inertias)
         error = replace(REST, force=FORCE)
-        led = commanded_acceleration("noninteracting", dynamics, error, impedance)[0]
-        pushed = push_acceleration(dynamics)
+        commanded = commanded_acceleration("noninteracting", dynamics, error, impedance)[0]
+        external = push_acceleration(dynamics)
         M_c, K_c = dynamics.inertias[0][0, 0], impedance.stiffness[0]
         print(
-            f"{M_c:10.2f}   {led:5.2f} m/s^2, {M_c * led / K_c:4.2f} m"
-            f"      {pushed:5.2f} m/s^2, {M_c * pushed / K_c:4.2f} m"
+            f"{M_c:10.2f}   {commanded:5.2f} m/s^2, {M_c * commanded / K_c:4.2f} m"
+            f"      {external:5.2f} m/s^2, {M_c * external / K_c:4.2f} m"
         )
 
 

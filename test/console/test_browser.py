@@ -313,7 +313,7 @@ def test_law_and_gains_are_changed(session: BrowserSession, page: Page) -> None:
     wait(page, "String(operatorConsole.status().subtasks.relative.stiffness) === '60,70'")
     gain.fill("1, 2, 3")
     gain.press("Enter")
-    wait(page, "document.querySelector('#answers .bad')?.textContent.includes('stiffness')")
+    wait(page, "document.querySelector('#responses .bad')?.textContent.includes('stiffness')")
     take_screenshot(page, "rejected_gains")
     page.select_option("#law", "noninteracting")
     wait(page, "operatorConsole.status().law === 'noninteracting'")

@@ -21,14 +21,14 @@ function colourOf(name) {
 }
 
 class Plot {
-  constructor(parent, title, floor) {
+  constructor(parent, title, minRange) {
     this.box = document.createElement("div");
     this.box.className = "plot";
     this.box.innerHTML = "<h3></h3><canvas></canvas><p></p>";
     this.box.querySelector("h3").textContent = title;
     this.canvas = this.box.querySelector("canvas");
     this.legend = this.box.querySelector("p");
-    this.floor = floor;
+    this.minRange = minRange;
     this.series = new Map();
     parent.append(this.box);
   }
@@ -57,7 +57,7 @@ class Plot {
     if (!all.length) return;
     const end = Math.max(...all.map(([time]) => time));
     let low = Math.min(0, ...all.map(([, value]) => value));
-    let high = Math.max(this.floor, ...all.map(([, value]) => value));
+    let high = Math.max(this.minRange, ...all.map(([, value]) => value));
     const padding = 0.06 * (high - low);
     [low, high] = [low < 0 ? low - padding : 0, high + padding];
     const x = (time) => MARGIN + ((time - end) / SPAN + 1) * (width - MARGIN - 2);
@@ -97,8 +97,8 @@ export class Plots {
     setInterval(() => this.draw(), 100);
   }
 
-  plot(key, title, floor) {
-    this.plots[key] ??= new Plot(this.parent, title, floor);
+  plot(key, title, minRange) {
+    this.plots[key] ??= new Plot(this.parent, title, minRange);
     return this.plots[key];
   }
 
@@ -117,8 +117,8 @@ export class Plots {
     }
     for (const [name, values] of Object.entries(energy)) {
       const owner = name || "team";
-      const add = (key, label, plot, title, floor) => {
-        if (key in values) this.plot(plot, title, floor).add(time, label, values[key]);
+      const add = (key, label, plot, title, minRange) => {
+        if (key in values) this.plot(plot, title, minRange).add(time, label, values[key]);
       };
       add("storage", owner, "storage", "Storage [J]", 1e-4);
       add("supplied", owner, "power", "Power supplied [W]", 1e-4);
