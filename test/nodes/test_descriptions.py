@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""URDFs on topics: waited for, checked, and not to be changed while something runs."""
+"""Robot descriptions on topics: wait, check, and changes while a node runs."""
 
 import signal
 import threading
@@ -27,7 +27,7 @@ SOURCELESS: dict[str, Any] = {"haptic": None, "planner": None, "lockstep_sources
 
 
 def on_topics(**changes: Any) -> dict[str, Any]:
-    """The scenario planar_arms, its arms described on topics."""
+    """Return the scenario `planar_arms` with descriptions on topics."""
     values = merged(PLANAR, SOURCELESS | {"force_sensors": None})
     for name, topic in TOPICS.items():
         kept = ("base_pose", "initial_position", "effort_limit", "velocity_limit")
@@ -37,8 +37,13 @@ def on_topics(**changes: Any) -> dict[str, Any]:
     return merged(values, changes)
 
 
-class Waiting:
-    """A node that is made in a thread of its own, for it waits."""
+class NodeInThread:
+    """Node constructed in a thread, since its constructor waits.
+
+    Attributes:
+        node: Node, or None while its constructor waits.
+        error: Exception of the constructor, or None.
+    """
 
     def __init__(self, ros: Ros, name: str, values: dict[str, Any]) -> None:
         self.node: Any = None
@@ -52,40 +57,45 @@ class Waiting:
         except Exception as error:
             self.error = error
 
-    def made(self) -> bool:
+    def constructed(self) -> bool:
         if self.error:
             raise self.error
         return self.node is not None
 
 
 @pytest.fixture
-def say(ros: Ros) -> Any:
-    """Publishes a robot's description."""
+def publish(ros: Ros) -> Any:
+    """Publish the description of a robot, and wait until it is processed."""
     publishers = {
         name: ros.probe.create_publisher(String, topic, LATCHED_QOS)
         for name, topic in TOPICS.items()
     }
-    return lambda name, text: publishers[name].publish(String(data=text))
+
+    def publish_text(name: str, text: str) -> None:
+        publishers[name].publish(String(data=text))
+        ros.drain()
+
+    return publish_text
 
 
-def test_a_controller_waits_says_so_refuses_and_goes_on(ros: Ros, say: Any) -> None:
-    """Missing descriptions are named; what is no URDF is refused in words; then all is built."""
+def test_a_controller_waits_for_valid_descriptions(ros: Ros, publish: Any) -> None:
+    """Diagnostics have the missing and rejected descriptions; the last one builds the node."""
     values = on_topics()
     monitor = ros.monitor(PLANAR)
-    controller = Waiting(ros, "controller", values)
+    controller = NodeInThread(ros, "controller", values)
     both = "description of left on /left/robot_description, right on /team/right_described"
     monitor.wait_for_status("controller", f"waiting for the {both}")
-    say("right", TEXTS["right"])
+    publish("right", TEXTS["right"])
     monitor.wait_for_status("controller", "description of left on /left/robot_description")
     for text, expected in (
         ("<robot", "text that is not XML"),
         ("<sdf/>", "XML with the root <sdf>"),
         (
             "<robot><link name='a'/><joint name='b' type='fixed'/></robot>",
-            "a URDF that the parser",
+            "a URDF that cannot be parsed",
         ),
     ):
-        say("left", text)
+        publish("left", text)
         until(
             monitor.has_status(
                 "controller",
@@ -94,8 +104,8 @@ def test_a_controller_waits_says_so_refuses_and_goes_on(ros: Ros, say: Any) -> N
             expected,
         )
         assert monitor.status["controller"][0] == 2
-    say("left", TEXTS["left"])
-    until(controller.made, "the controller")
+    publish("left", TEXTS["left"])
+    until(controller.constructed, "the controller")
     monitor.wait_for_status("controller", "waiting for the first state")
     team = controller.node.core.team
     expected_team = Scenario.from_dict(PLANAR).build_team()
@@ -110,52 +120,47 @@ def test_a_controller_waits_says_so_refuses_and_goes_on(ros: Ros, say: Any) -> N
 
 
 @pytest.mark.parametrize("lockstep", [True, False])
-def test_the_same_again_is_no_news_and_another_one_stops(
-    ros: Ros, say: Any, lockstep: bool
-) -> None:
-    """Republished unchanged nothing happens; changed, the team is held still until a restart."""
+def test_a_changed_description_holds_the_team(ros: Ros, publish: Any, lockstep: bool) -> None:
+    """An unchanged one has no effect; a changed one holds the team until a restart."""
     for name, text in TEXTS.items():
-        say(name, text)
+        publish(name, text)
     values = on_topics(rate=100.0, telemetry_rate=100.0, lockstep=lockstep)
     monitor = ros.monitor(PLANAR)
-    waiting = [Waiting(ros, name, values) for name in ("robot_team", "controller")]
-    for item in waiting:
-        until(item.made, "the node")
+    nodes = [NodeInThread(ros, name, values) for name in ("robot_team", "controller")]
+    for item in nodes:
+        until(item.constructed, "the node")
     monitor.wait_for_status("controller", "holding cooperative, relative: source silent")
-    say("left", TEXTS["left"] + "\n")
-    until(monitor.has_new_status("controller"))
-    until(monitor.has_new_status("controller"))
-    assert "changed" not in monitor.status["controller"][1]
-    say("left", TEXTS["left"].replace("1.0", "2.0"))
+    publish("left", TEXTS["left"] + "\n")
+    assert not nodes[1].node.descriptions.problem
+    publish("left", TEXTS["left"].replace("1.0", "2.0"))
+    text = "the description of left has changed; restart the node"
     for name in ("controller", "robot_team"):
-        until(
-            monitor.has_status(name, "the description of left has changed; restart the node"), name
-        )
+        monitor.wait_for_status(name, text)
         assert monitor.status[name][0] == 2
-    say("left", TEXTS["left"])
-    until(monitor.has_new_status("controller"))
-    until(monitor.has_new_status("controller"))
-    assert "holding: the description of left has changed" in monitor.status["controller"][1]
-    assert waiting[1].node.core.mode.stopped
+    publish("left", TEXTS["left"])
+    assert nodes[1].node.descriptions.problem == text
+    monitor.wait_for_timers("controller")
+    assert monitor.status["controller"][1] == f"holding: {text}"
+    assert nodes[1].node.core.mode.stopped
 
 
-def test_a_scenario_that_does_not_fit_ends_the_program(ros: Ros, say: Any) -> None:
-    """A good description and a wrong key are the scenario's fault: nothing better will come."""
+def test_a_scenario_that_does_not_fit_a_description_is_an_error(ros: Ros, publish: Any) -> None:
+    """A valid description with an invalid key is an error of the scenario, so the node ends."""
     for name, text in TEXTS.items():
-        say(name, text)
-    controller = Waiting(ros, "controller", on_topics(left={"tool_frame": "hand"}))
+        publish(name, text)
+    controller = NodeInThread(ros, "controller", on_topics(left={"tool_frame": "hand"}))
     with pytest.raises(ScenarioError, match=r"left.tool_frame: found 'hand', allowed: .*tool"):
-        until(controller.made, "the refusal")
+        until(controller.constructed, "the error")
 
 
-def test_without_a_program_a_topic_is_no_description() -> None:
-    """Who only reads the scenario is told what to do."""
+def test_a_scenario_read_without_ros_needs_a_description() -> None:
+    """The error has the command that creates one."""
     with pytest.raises(ScenarioError, match=r"left.urdf: .* a file by `noninteract describe`"):
         Scenario.from_dict(on_topics())
 
 
-def test_a_program_that_waits_ends_when_it_is_told_to(ros: Ros, programs: Programs) -> None:
-    """Ctrl-C while it waits: exit status 0, no traceback."""
+def test_a_waiting_program_ends_on_sigint(ros: Ros, programs: Programs) -> None:
+    """Exit status 0, no traceback."""
     monitor = ros.monitor(PLANAR)
     process = programs.start("controller", on_topics())
     monitor.wait_for_status("controller", "waiting for the description")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Start and end of the programs, and the scenario as their parameters."""
+"""Startup and shutdown of the programs, and the scenario as their parameters."""
 
 import json
 import re
@@ -23,16 +23,16 @@ from noninteract_ros.nodes.common.parameter_files import dump, rewrite
 PAPER = str(ROOT / "config" / "paper.yaml")
 NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
 
-# One process tries all command lines: the programs' main function returns the exit status.
-TRIES = """
+# One process runs all command lines, since the main function returns the exit status.
+SCRIPT = """
 import contextlib, io, json, sys
 from noninteract_ros.nodes.controller.controller import main
 
 for line in sys.stdin:
-    said = io.StringIO()
-    with contextlib.redirect_stderr(said):
+    output = io.StringIO()
+    with contextlib.redirect_stderr(output):
         status = main(["controller", *json.loads(line)])
-    print(json.dumps([status, said.getvalue()]))
+    print(json.dumps([status, output.getvalue()]))
 """
 
 ROS_ARGS = ["--ros-args", "--params-file"]
@@ -52,8 +52,8 @@ FILES = {
     "text.yaml": "/**: {ros__parameters: {rate: fast}}",
     "other.yaml": "/**: {ros__parameters: {law: nointeracting}}",
 }
-# Arguments after `--ros-args --params-file PAPER`, and what the one line says; {} is the folder.
-WRONG = [
+# Arguments after `--ros-args --params-file PAPER`, and text of the error; {} is the folder.
+INVALID = [
     (["--params-file", "{}/absent.yaml"], "{}/absent.yaml: (file): found No such file"),
     (["--params-file", "{}/nothing.yaml"], "{}/nothing.yaml: (file): found nothing"),
     (["--params-file", "{}/broken.yaml"], "{}/broken.yaml: (file): found while parsing"),
@@ -82,16 +82,16 @@ WRONG = [
 ]
 
 
-def test_a_wrong_start_is_said_in_one_line(programs: Programs, tmp_path: Path) -> None:
-    """Exit status 2 before anything moves, and one line: file, key, found, allowed."""
+def test_invalid_arguments_are_reported_in_one_line(programs: Programs, tmp_path: Path) -> None:
+    """Exit status 2 and one line with file, key, found and allowed values."""
     for name, text in FILES.items():
         (tmp_path / name).write_text(text)
     lines = [
         json.dumps([*ROS_ARGS, PAPER, *(item.format(tmp_path) for item in arguments)])
-        for arguments, _ in WRONG
+        for arguments, _ in INVALID
     ]
-    tried = subprocess.run(
-        [sys.executable, "-c", TRIES],
+    completed = subprocess.run(
+        [sys.executable, "-c", SCRIPT],
         input="\n".join(lines),
         capture_output=True,
         text=True,
@@ -99,32 +99,32 @@ def test_a_wrong_start_is_said_in_one_line(programs: Programs, tmp_path: Path) -
         env=programs.environment,
         cwd=ROOT,
     )
-    assert tried.returncode == 0, tried.stderr
-    answers = [json.loads(line) for line in tried.stdout.splitlines()]
-    for (arguments, expected), (status, said) in zip(WRONG, answers, strict=True):
+    assert completed.returncode == 0, completed.stderr
+    answers = [json.loads(line) for line in completed.stdout.splitlines()]
+    for (arguments, expected), (status, output) in zip(INVALID, answers, strict=True):
         assert status == 2, arguments
-        assert len(said.splitlines()) == 1, said
-        assert expected.format(tmp_path) in said, said
-        assert ", allowed: " in said
+        assert len(output.splitlines()) == 1, output
+        assert expected.format(tmp_path) in output, output
+        assert ", allowed: " in output
 
 
-def test_each_program_refuses_a_wrong_scenario(programs: Programs) -> None:
-    """So does every program on its own, with nothing else on its output."""
+def test_each_program_rejects_an_invalid_scenario(programs: Programs) -> None:
+    """The error is the only output of each program."""
     for name in NAMES:
         programs.start(name, paper(robot_2={"mass": -1.0}))
     for name in NAMES:
         assert programs.running[name].wait(DEADLINE) == 2
-        said = programs.log(name).splitlines()
-        assert len(said) == 1
-        assert "scenario.yaml: robot_2.mass: found -1.0, allowed: a number > 0" in said[0]
+        lines = programs.log(name).splitlines()
+        assert len(lines) == 1
+        assert "scenario.yaml: robot_2.mass: found -1.0, allowed: a number > 0" in lines[0]
 
 
 @pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "wall"])
 @pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_each_program_cleanly(
+def test_each_program_shuts_down_on_a_signal(
     ros: Ros, programs: Programs, lockstep: bool, first: signal.Signals
 ) -> None:
-    """In the middle of a run: status 0, and no trace on the output."""
+    """Exit status 0 during a run, and no traceback."""
     values = paper(lockstep=lockstep, rate=200.0)
     monitor = ros.monitor(values)
     for name in NAMES:
@@ -139,15 +139,15 @@ def test_a_signal_ends_each_program_cleanly(
 
 
 def test_a_program_without_its_block_does_not_start(ros: Ros) -> None:
-    """The emulator wants a block `haptic`, the planner a block `planner`."""
+    """The emulator needs a block `haptic`, the planner a block `planner`."""
     with pytest.raises(ScenarioError, match="haptic: found nothing"):
         ros.make("haptic_emulator", paper(haptic=None))
     with pytest.raises(ScenarioError, match="planner: found nothing"):
         ros.make("relative_planner", paper(planner=None))
 
 
-def test_every_key_is_a_described_parameter(ros: Ros) -> None:
-    """All keys are declared with value, meaning and range; none can be changed in this node."""
+def test_every_key_is_a_parameter_with_a_description(ros: Ros) -> None:
+    """All keys are declared with value and description; none is live in this node."""
     values = paper(lockstep_sources=[])
     node = ros.make("robot_team", values)
     listed = ros.call(ListParameters, "robot_team/list_parameters").result.names
@@ -156,8 +156,10 @@ def test_every_key_is_a_described_parameter(ros: Ros) -> None:
     assert set(dict(flat(values))) <= set(expected)
     names = list(expected)
     request = DescribeParameters.Request(names=names)
-    told = ros.call(DescribeParameters, "robot_team/describe_parameters", request).descriptors
-    for name, descriptor in zip(names, told, strict=True):
+    descriptors = ros.call(
+        DescribeParameters, "robot_team/describe_parameters", request
+    ).descriptors
+    for name, descriptor in zip(names, descriptors, strict=True):
         assert descriptor.description == expected[name][0].doc
         assert descriptor.read_only
     wanted = ["rate", "robot_1.axes", "relative.edges", "cooperative.authority"]
@@ -170,8 +172,8 @@ def test_every_key_is_a_described_parameter(ros: Ros) -> None:
     assert not ros.call(SetParameters, "robot_team/set_parameters", change).results[0].successful
 
 
-def test_the_last_word_counts_whatever_its_type(tmp_path: Path) -> None:
-    """A number, a list and a text that are given again, with another type, replace the first."""
+def test_the_last_value_wins_whatever_its_type(tmp_path: Path) -> None:
+    """A later number, list or string of another type replaces the first one."""
     files = [tmp_path / "first.yaml", tmp_path / "second.yaml"]
     files[0].write_text("/**: {ros__parameters: {rate: 100, haptic: {file: a, centre: [1, 2]}}}")
     files[1].write_text("/**: {ros__parameters: {haptic.centre: [0.5, 1.0]}}")
@@ -184,8 +186,8 @@ def test_the_last_word_counts_whatever_its_type(tmp_path: Path) -> None:
     assert rewrite(["", "-p", "axes:=[x, y]"], tmp_path)[2] == 'axes:=["x", "y"]'
 
 
-def test_a_parameter_file_is_read_as_it_is_meant() -> None:
-    """`y` stays a name, whole and other numbers may stand in one list, order is kept."""
+def test_a_written_parameter_file_is_unambiguous() -> None:
+    """`y` stays a string, mixed numbers become floats, and the order is kept."""
     content = {"/**": {"ros__parameters": {"axes": ["x", "y"], "centre": [0, 1.5]}}}
     assert dump(content) == (
         '"/**":\n  "ros__parameters":\n    "axes":\n    - "x"\n    - "y"\n'

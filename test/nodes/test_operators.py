@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Programs for people's devices, fed with what the real drivers publish, in front of a team."""
+"""Nodes of input devices, with the messages of real drivers and a simulated team."""
 
 import os
 import pty
@@ -30,11 +30,11 @@ REST = [0.0] * 6
 
 
 class OperatorHarness:
-    """A team in wall time without a human, one operator's program and the device's driver."""
+    """Team in wall time without a human, and the node of one input device."""
 
     def __init__(self, ros: Ros, make: Callable[..., Any], **changes: Any) -> None:
         self.ros = ros
-        # Patient, for the test may be kept waiting; what is tested does not depend on it.
+        # A long timeout, since a slow machine may delay the test.
         patient = {"operator": {"hold_timeout": 1.0}}
         values = paper(haptic=None, object=None, lockstep=False, **(patient | changes))
         values["cooperative"]["timeout"] = 0.3
@@ -42,45 +42,53 @@ class OperatorHarness:
         self.monitor = self.stack.monitor
         overrides = [Parameter(k, value=v) for k, v in _flat(self.stack.values)]
         self.node = ros.add_node(make(context=ros.context, parameter_overrides=overrides))
-        self.said: list[tuple[float, Any]] = []
+        self.commands: list[tuple[float, Any]] = []
         for kind, topic in ((TwistStamped, "target_twist"), (PoseStamped, "target_pose")):
-            ros.probe.create_subscription(kind, f"cooperative/human/{topic}", self._note, 100)
+            ros.probe.create_subscription(
+                kind, f"cooperative/human/{topic}", self._on_command, 100
+            )
         until(lambda: self.node.desired() is not None, "the desired motion")
 
-    def _note(self, message: Any) -> None:
-        self.said.append((time.monotonic(), message))
+    def _on_command(self, message: Any) -> None:
+        self.commands.append((time.monotonic(), message))
 
     def rates(self) -> np.ndarray:
-        """Rates that were said, shape (n, 2)."""
-        twists = [item.twist.linear for _, item in list(self.said) if hasattr(item, "twist")]
+        """Return the published rates, shape (n, 2)."""
+        twists = [item.twist.linear for _, item in list(self.commands) if hasattr(item, "twist")]
         return np.array([[item.x, item.y] for item in twists]).reshape(-1, 2)
 
-    def place(self) -> np.ndarray:
-        """Where the team's middle is."""
+    def centre(self) -> np.ndarray:
+        """Return the centre of the team, shape (2,) [m]."""
         q = self.monitor.newest().position
         assert q is not None
         return 0.5 * (q[:2] + q[2:])
 
     def speed(self) -> float:
-        """Speed of the desired motion."""
-        found = self.node.desired()
-        return float(np.linalg.norm(found.velocity)) if found else 0.0
+        """Return the speed of the desired motion [m/s]."""
+        desired = self.node.desired()
+        return float(np.linalg.norm(desired.velocity)) if desired else 0.0
 
     def publish(self, publisher: Any, message: Any, rate: float, done: Callable[[], Any]) -> None:
-        """Publishes at a rate until something is true."""
+        """Publish at a rate [Hz] until a condition is true, as a driver does."""
         end = time.monotonic() + DEADLINE
         while not done():
-            assert time.monotonic() < end, "nothing came of it"
+            assert time.monotonic() < end, "no effect before the deadline"
             publisher.publish(message)
             time.sleep(1.0 / rate)
 
-    def rests(self) -> None:
-        """Waits until the device is let go, the last words are said, and the team rests."""
+    def expect_no_command(self) -> None:
+        """Check that nothing is published after all messages so far are processed."""
+        self.ros.drain()
+        count = len(self.commands)
+        self.monitor.wait_for_timers(self.node.get_name())
+        self.ros.drain()
+        assert len(self.commands) == count
+
+    def wait_for_release(self) -> None:
+        """Wait until the device is released and the team is at rest without further commands."""
         until(lambda: self.speed() < 1e-3, "rest")
-        until(lambda: self.node._releases_left == 0, "the last words")
-        count = len(self.said)
-        until(self.monitor.has_new_status(self.node.get_name()))
-        assert len(self.said) <= count + 1  # One may have been on its way.
+        until(lambda: self.node._releases_left == 0, "the zero rates of the release")
+        self.expect_no_command()
 
 
 def _flat(values: dict[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
@@ -92,81 +100,80 @@ def _flat(values: dict[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def mapping(name: str) -> dict[str, Any]:
-    """One of the package's mapping files."""
+    """Read a mapping file of the package."""
     return read_parameters(ROOT / "config" / "devices" / f"{name}.yaml")
 
 
 def joy(axes: list[float], pressed: tuple[int, ...] = (), count: int = 21) -> Joy:
-    """A message as drivers make it."""
+    """Return a message as published by drivers."""
     message = Joy(axes=axes, buttons=[int(n in pressed) for n in range(count)])
     message.header.frame_id = "joy"
     return message
 
 
-def test_a_gamepad_leads_while_its_button_is_held(ros: Ros) -> None:
-    """Autorepeat at 20 Hz: forward while held, rest on letting go, then silence for others."""
-    bench = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
+def test_a_gamepad_commands_while_its_button_is_held(ros: Ros) -> None:
+    """Autorepeat at 20 Hz: motion while held, rest on release, then no messages."""
+    setup = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.wait_for_subscribers(driver)
-    start = bench.place()
-    for _ in range(10):  # The stick alone does nothing.
+    start = setup.centre()
+    for _ in range(10):  # The stick alone has no effect.
         driver.publish(joy(FORWARD))
-        time.sleep(0.02)
-    assert not bench.said
+    setup.expect_no_command()
+    assert not setup.commands
     held = joy(FORWARD, (ENABLE,))
-    bench.publish(driver, held, 20.0, lambda: bench.place()[0] > start[0] + 0.05)
-    rates = bench.rates()
+    setup.publish(driver, held, 20.0, lambda: setup.centre()[0] > start[0] + 0.05)
+    rates = setup.rates()
     np.testing.assert_allclose(rates, np.tile([0.2, 0.0], (len(rates), 1)))
     driver.publish(joy(FORWARD))
-    bench.rests()
-    assert not bench.rates()[-1].any()
-    assert abs(bench.place()[1] - start[1]) < 0.05
+    setup.wait_for_release()
+    assert not setup.rates()[-1].any()
+    assert abs(setup.centre()[1] - start[1]) < 0.05
 
 
-def test_a_gamepad_that_is_cut_off_lets_go_until_it_is_held_anew(ros: Ros) -> None:
-    """No more messages with the button pressed: rest; they return: still rest, until released."""
-    bench = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
+def test_a_disconnected_gamepad_is_released_until_its_button_is_pressed_again(ros: Ros) -> None:
+    """Lost messages stop the team; the button must be released before it has an effect again."""
+    setup = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.wait_for_subscribers(driver)
     held = joy(FORWARD, (ENABLE,))
-    bench.publish(driver, held, 20.0, lambda: bench.speed() > 0.15)
-    bench.rests()
-    count = len(bench.said)
+    setup.publish(driver, held, 20.0, lambda: setup.speed() > 0.15)
+    setup.wait_for_release()
     for _ in range(10):
         driver.publish(held)
-        time.sleep(0.05)
-    assert len(bench.said) == count
+    setup.expect_no_command()
     driver.publish(joy(REST))
-    bench.publish(driver, held, 20.0, lambda: bench.speed() > 0.15)
+    setup.publish(driver, held, 20.0, lambda: setup.speed() > 0.15)
 
 
-@pytest.mark.parametrize("rate", [60.0, 500.0], ids=["as its events come", "in a flood"])
-def test_a_space_mouse_leads_while_it_is_deflected(ros: Ros, rate: float) -> None:
-    """No buttons, nothing at rest, zeros after the last motion."""
-    bench = OperatorHarness(ros, JoyOperator, **mapping("joy_spacenav"))
+@pytest.mark.parametrize("rate", [60.0, 500.0], ids=["at the rate of its events", "in a burst"])
+def test_a_space_mouse_commands_while_it_is_deflected(ros: Ros, rate: float) -> None:
+    """It has no buttons, and publishes zeros after the last motion."""
+    setup = OperatorHarness(ros, JoyOperator, **mapping("joy_spacenav"))
     driver = ros.probe.create_publisher(Joy, "/spacenav/joy", 10)
     ros.wait_for_subscribers(driver)
     deflected = joy([0.0, -0.8, 0.3, 0.0, 0.0, 0.0], count=0)
-    bench.publish(driver, deflected, rate, lambda: bench.speed() > 0.1)
-    assert (bench.rates()[1:, 1] < 0.0).all()
+    setup.publish(driver, deflected, rate, lambda: setup.speed() > 0.1)
+    assert (setup.rates()[1:, 1] < 0.0).all()
     driver.publish(joy(REST, count=0))
-    bench.rests()
+    setup.wait_for_release()
 
 
-def test_a_bad_message_is_refused_and_moves_nothing(ros: Ros) -> None:
-    """Two axes are another device's; the diagnostics say so."""
-    bench = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
+def test_an_invalid_message_is_rejected(ros: Ros) -> None:
+    """A message with two axes is of another device; diagnostics have the reason."""
+    setup = OperatorHarness(ros, JoyOperator, **mapping("joy_gamepad"))
     driver = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.wait_for_subscribers(driver)
     driver.publish(joy([1.0, 1.0], (ENABLE,)))
     until(
-        lambda: "needs 4" in bench.monitor.value("joy_operator", "last rejection"), "the refusal"
+        lambda: "needs 4" in setup.monitor.value("joy_operator", "last rejection"), "the rejection"
     )
-    assert not bench.said
+    setup.expect_no_command()
+    assert not setup.commands
 
 
 def pose(x: float, y: float, frame: str = "phantom_base") -> PoseStamped:
-    """What a haptic device's driver says, in its own frame."""
+    """Return a pose as published by the driver of a haptic device, in its own frame."""
     message = PoseStamped()
     message.header.frame_id = frame
     message.pose.position.x, message.pose.position.y = x, y
@@ -174,68 +181,67 @@ def pose(x: float, y: float, frame: str = "phantom_base") -> PoseStamped:
     return message
 
 
-def test_a_tracker_leads_with_its_clutch_from_where_the_team_is(ros: Ros) -> None:
-    """Device at 3 m, team at 0: taking hold moves nothing, moving by 6 cm moves it by 6 cm."""
-    bench = OperatorHarness(ros, PoseOperator)
+def test_a_tracker_moves_the_team_from_where_its_clutch_is_closed(ros: Ros) -> None:
+    """Device at 3 m, team at 0: clutching moves nothing, and 6 cm of motion move it by 6 cm."""
+    setup = OperatorHarness(ros, PoseOperator)
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     clutch = ros.probe.create_publisher(Bool, "device/clutch", 10)
     ros.wait_for_subscribers(driver, clutch)
-    start = bench.place()
+    start = setup.centre()
     for _ in range(20):
         driver.publish(pose(3.0, 3.0))
-        time.sleep(0.01)
-    assert not bench.said
+    setup.expect_no_command()
+    assert not setup.commands
     clutch.publish(Bool(data=True))
-    bench.publish(driver, pose(3.0, 3.0), 100.0, lambda: len(bench.said) > 10)
-    first = bench.said[0][1].pose.position
+    setup.publish(driver, pose(3.0, 3.0), 100.0, lambda: len(setup.commands) > 10)
+    first = setup.commands[0][1].pose.position
     np.testing.assert_allclose([first.x, first.y], start, atol=5e-3)
-    assert bench.speed() < 1e-3
-    for k in range(1, 13):  # As a hand moves: 0.5 m/s.
+    assert setup.speed() < 1e-3
+    for k in range(1, 13):  # Steps below the largest jump, in 0.12 s.
         driver.publish(pose(3.0 + 0.005 * k, 3.0))
         time.sleep(0.01)
     goal = start + np.array([0.06, 0.0])
 
-    def there() -> bool:
-        return bool(np.abs(bench.place() - goal).max() < 3e-3)
+    def reached() -> bool:
+        return bool(np.abs(setup.centre() - goal).max() < 3e-3)
 
-    bench.publish(driver, pose(3.06, 3.0), 100.0, there)
+    setup.publish(driver, pose(3.06, 3.0), 100.0, reached)
     clutch.publish(Bool(data=False))
     driver.publish(pose(3.06, 3.0))
-    bench.rests()
-    # Held anew elsewhere: nothing jumps.
+    setup.wait_for_release()
+    # Clutching elsewhere does not move the team.
     clutch.publish(Bool(data=True))
-    count = len(bench.said)
-    bench.publish(driver, pose(2.0, 1.0), 100.0, lambda: len(bench.said) > count + 10)
-    assert np.abs(bench.place() - goal).max() < 5e-3
+    count = len(setup.commands)
+    setup.publish(driver, pose(2.0, 1.0), 100.0, lambda: len(setup.commands) > count + 10)
+    assert np.abs(setup.centre() - goal).max() < 5e-3
 
 
-def test_a_tracker_that_jumps_lets_go(ros: Ros) -> None:
-    """A pose half a metre away in one message is a glitch: refused, the clutch lets go."""
-    bench = OperatorHarness(ros, PoseOperator)
+def test_a_jump_of_the_tracker_releases_the_clutch(ros: Ros) -> None:
+    """A pose half a metre away in one message is rejected, and the clutch is released."""
+    setup = OperatorHarness(ros, PoseOperator)
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     clutch = ros.probe.create_publisher(Bool, "device/clutch", 10)
     ros.wait_for_subscribers(driver, clutch)
     clutch.publish(Bool(data=True))
-    bench.publish(driver, pose(0.0, 0.0), 100.0, lambda: len(bench.said) > 5)
-    start = bench.place()
-    bench.publish(driver, pose(0.5, 0.0), 100.0, lambda: bench.node._rejected)
+    setup.publish(driver, pose(0.0, 0.0), 100.0, lambda: len(setup.commands) > 5)
+    start = setup.centre()
+    setup.publish(driver, pose(0.5, 0.0), 100.0, lambda: setup.node._rejected)
     for _ in range(20):
         driver.publish(pose(0.5, 0.0))
-        time.sleep(0.01)
-    bench.rests()
-    assert np.abs(bench.place() - start).max() < 5e-3
+    setup.wait_for_release()
+    assert np.abs(setup.centre() - start).max() < 5e-3
 
 
-def test_a_button_is_a_clutch_whose_silence_lets_go(ros: Ros) -> None:
-    """Autorepeat at 20 Hz; a gamepad that is cut off while poses go on holds nothing any more."""
-    bench = OperatorHarness(ros, PoseOperator, tracker={"joy_topic": "/joy", "clutch_button": 2})
+def test_a_clutch_button_is_released_when_its_topic_times_out(ros: Ros) -> None:
+    """Autorepeat at 20 Hz; a disconnected gamepad releases the clutch while poses go on."""
+    setup = OperatorHarness(ros, PoseOperator, tracker={"joy_topic": "/joy", "clutch_button": 2})
     driver = ros.probe.create_publisher(PoseStamped, "device/pose", 10)
     gamepad = ros.probe.create_publisher(Joy, "/joy", 10)
     ros.wait_for_subscribers(driver, gamepad)
-    start, moved = bench.place(), 0.0
+    start, moved = setup.centre(), 0.0
 
     def held(step: float, done: Callable[[], Any]) -> None:
-        """As a hand moves, at 0.5 m/s at most; the button is told of with every fifth pose."""
+        """Move at 0.5 m/s at most, with the button in every fifth message."""
         nonlocal moved
         for k in range(round(DEADLINE / 0.01)):
             if done():
@@ -245,56 +251,59 @@ def test_a_button_is_a_clutch_whose_silence_lets_go(ros: Ros) -> None:
             if k % 5 == 0:
                 gamepad.publish(joy(REST, (2,)))
             time.sleep(0.01)
-        raise AssertionError("nothing came of it")
+        raise AssertionError("no effect before the deadline")
 
-    held(0.0, lambda: len(bench.said) > 10)
-    held(5e-3, lambda: abs(bench.place()[0] - start[0] - 0.06) < 3e-3)
-    bench.publish(driver, pose(3.06, 3.0), 100.0, lambda: bench.node._releases_left == 0)
-    count = len(bench.said)
-    gamepad.publish(joy(REST, (2,)))  # Back, and still pressed: it has to be pressed anew.
-    bench.publish(driver, pose(3.06, 3.0), 100.0, bench.monitor.has_new_status("pose_operator"))
-    assert len(bench.said) <= count + 1
-    assert not bench.node.input.clutched
+    held(0.0, lambda: len(setup.commands) > 10)
+    held(5e-3, lambda: abs(setup.centre()[0] - start[0] - 0.06) < 3e-3)
+    setup.publish(driver, pose(3.06, 3.0), 100.0, lambda: setup.node._releases_left == 0)
+    ros.drain()
+    count = len(setup.commands)
+    gamepad.publish(joy(REST, (2,)))  # Connected again: the button must be pressed again.
+    setup.publish(driver, pose(3.06, 3.0), 100.0, setup.monitor.has_new_status("pose_operator"))
+    setup.publish(driver, pose(3.06, 3.0), 100.0, setup.monitor.has_new_status("pose_operator"))
+    ros.drain()
+    assert len(setup.commands) == count
+    assert not setup.node.input.clutched
 
 
-class Keys:
-    """A keyboard program on a terminal of its own."""
+class Keyboard:
+    """Node of the keyboard on a pseudo-terminal."""
 
     def __init__(self) -> None:
         self.keyboard, self.terminal = pty.openpty()
 
     def make(self, **kwargs: Any) -> KeyboardOperator:
-        """The node."""
+        """Create the node."""
         return KeyboardOperator(terminal=self.terminal, **kwargs)
 
-    def strike(self, keys: str) -> None:
-        """Strikes keys."""
+    def press(self, keys: str) -> None:
+        """Write keys to the terminal."""
         os.write(self.keyboard, keys.encode())
 
 
-def test_a_key_leads_while_it_repeats_and_space_stops(ros: Ros) -> None:
-    """As a terminal repeats: at once, after half a second, then 30 times a second."""
-    keys = Keys()
-    before = termios.tcgetattr(keys.terminal)
-    bench = OperatorHarness(ros, keys.make)
-    keys.strike("d")
-    time.sleep(0.5)  # What the keyboard waits before it repeats.
+def test_a_key_commands_while_it_repeats_and_space_stops(ros: Ros) -> None:
+    """A terminal repeats a key after half a second, then 30 times a second."""
+    keyboard = Keyboard()
+    before = termios.tcgetattr(keyboard.terminal)
+    setup = OperatorHarness(ros, keyboard.make)
+    keyboard.press("d")
+    time.sleep(0.5)  # Delay before the first repetition.
     end = time.monotonic() + DEADLINE
-    while bench.place()[1] > -0.05:
-        assert time.monotonic() < end, "nothing came of it"
-        keys.strike("d")
+    while setup.centre()[1] > -0.05:
+        assert time.monotonic() < end, "no effect before the deadline"
+        keyboard.press("d")
         time.sleep(0.033)
-    rates = bench.rates()
+    rates = setup.rates()
     np.testing.assert_allclose(rates, np.tile([0.0, -0.1], (len(rates), 1)))
-    keys.strike(" ")
-    until(lambda: not bench.node.dead_man.is_held(time.monotonic()), "the stop")
-    bench.rests()
-    bench.ros.remove(bench.node)
-    assert termios.tcgetattr(keys.terminal)[3] == before[3]  # Echo and lines, as they were.
+    keyboard.press(" ")
+    until(lambda: not setup.node.dead_man.is_held(time.monotonic()), "the stop")
+    setup.wait_for_release()
+    setup.ros.remove(setup.node)
+    assert termios.tcgetattr(keyboard.terminal)[3] == before[3]  # Echo and line mode are restored.
 
 
-def test_without_a_terminal_there_is_no_keyboard(ros: Ros) -> None:
-    """A pipe is refused in one line."""
+def test_a_keyboard_needs_a_terminal(ros: Ros) -> None:
+    """A pipe is an error."""
     read, write = os.pipe()
     overrides = [Parameter(k, value=v) for k, v in _flat(merged(paper(), {}))]
     with pytest.raises(ScenarioError, match=r"\(terminal\).*allowed: a terminal"):
