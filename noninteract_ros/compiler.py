@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compilation of functions to machine code, kept until their sources change."""
+"""Compilation of functions to machine code, cached until their sources change."""
 
 import hashlib
 from collections.abc import Callable
@@ -11,12 +11,12 @@ import numba
 import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-FIRST = cast(int, np.intp(0))  # A literal would have functions compiled once more.
+FIRST = cast(int, np.intp(0))  # A literal would compile another specialisation.
 
 
 @cache
 def _source_digest(folder: Path) -> bytes:
-    """Digest of all sources of a folder: its functions call each other across files."""
+    """Return the digest of a folder's sources, whose functions call each other across files."""
     digest = hashlib.sha256()
     for file in sorted(folder.glob("*.py")):
         digest.update(file.read_bytes())
@@ -24,28 +24,29 @@ def _source_digest(folder: Path) -> bytes:
 
 
 def compiled(function: Function) -> Function:
-    """Compiles a function for the arguments that it first meets, and keeps the machine code.
+    """Compile a function for the types of its first arguments, and cache the machine code.
 
-    Arithmetic is IEEE's to the letter: nothing is reordered or contracted, and a division by zero
-    gives inf or NaN, as numpy's does. The code is kept where numba finds a place, beside the
-    source or in the user's cache; where there is none, each process compiles anew.
+    Arithmetic follows IEEE 754 strictly: nothing is reordered or contracted, and a division by
+    zero gives inf or NaN, as in numpy. The cache lies beside the source or in the user's cache
+    folder; without a writable folder, each process compiles anew.
     """
     return _cached(numba.njit(error_model="numpy", no_cfunc_wrapper=True)(function))
 
 
 def inner(function: Function) -> Function:
-    """The same for functions that only compiled ones call, which saves half the time for them."""
+    """Compile a function that is called from compiled functions only, in half the time."""
     options = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
     return _cached(numba.njit(error_model="numpy", **options)(function))
 
 
 def _cached(kernel: Any) -> Any:
-    """The function with its machine code kept until any source in its folder changes.
+    """Enable the cache of a function, invalidated by a change of any source in its folder.
 
-    numba alone looks at the function's own file, and would go on with what has changed elsewhere.
+    By default, numba checks the function's own file only, and would keep code that calls changed
+    functions of other files.
     """
     if numba.config.DISABLE_JIT:
-        return kernel  # It is the Python function itself.
+        return kernel  # The Python function itself.
     try:
         kernel.enable_caching()
     except RuntimeError:

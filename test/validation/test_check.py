@@ -198,7 +198,7 @@ def test_an_unstable_loop_suggests_a_remedy() -> None:
     loop = Loop("arms", M, D, K, 1000.0)
     assert loop.growth == pytest.approx(2.0, abs=0.02)
     text = loop.warning()
-    assert "multiplies an error by" in text
+    assert "an error grows by a factor of" in text
     words = text.split()
     rate, share = float(words[words.index("Hz") - 1]), float(words[words.index("%") - 1]) / 100
     assert Loop("arms", M, D, K, rate + 1.0).stable

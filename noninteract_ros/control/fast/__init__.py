@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The same law robot by robot, at a cost linear in the number of robots."""
+"""Robot-by-robot form of the law, at a cost linear in the number of robots."""

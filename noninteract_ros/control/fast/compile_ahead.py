@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compiles the law for this machine: `python -m noninteract_ros.control.fast.compile_ahead`.
+"""Compile the law in advance: `python -m noninteract_ros.control.fast.compile_ahead`.
 
-A controller does so by itself at its first start, and later ones find the machine code. Who
-prepares a machine can spare it that time.
+Otherwise a controller compiles at its first start, and later ones load the cached code.
 """
 
 from noninteract_ros.control.fast.compiled_layout import CompiledLayout
@@ -15,7 +14,7 @@ from noninteract_ros.team.team import Team
 
 
 def compile_ahead() -> None:
-    """Compiles everything, or finds it compiled; the code is the same for all teams."""
+    """Compile all functions, or load them from the cache; the code is the same for all teams."""
     team = Team([PointMass(mass=1.0).build(name) for name in ("first", "second")])
     lead = CooperativePosition("cooperative_position").build("lead", team)
     gap = RelativePosition("relative_position").build("gap", team)

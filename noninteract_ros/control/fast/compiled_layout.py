@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Layouts of a controller, whose differences at each tick are compiled."""
+"""Layout with compiled differences, for the controller."""
 
 from collections.abc import Callable
 from functools import cached_property, partial
@@ -11,9 +11,10 @@ from noninteract_ros.subtasks.layout import Layout, ValueMotion
 
 
 class CompiledLayout(Layout):
-    """The same layout, quicker with single values.
+    """Layout whose differences of single values are compiled.
 
-    Arrays are copied: to numba those that are only for reading, or have gaps, are other kinds.
+    Arrays are copied first: read-only or non-contiguous arrays would compile another
+    specialisation.
 
     Args:
         layout: The layout.
@@ -24,7 +25,7 @@ class CompiledLayout(Layout):
 
     @cached_property
     def _functions(self) -> tuple[Callable[..., Array], Callable[..., tuple[Array, Array]]]:
-        """Difference and deviation; numba is imported by who needs them."""
+        """Compiled difference and deviation; numba is imported at the first use."""
         from noninteract_ros.control.fast.kernels.motions import Numbers, deviation, difference
 
         begin = self.quaternions[:, 0].copy(), self.angular[:, 0].copy()
@@ -32,19 +33,19 @@ class CompiledLayout(Layout):
         return partial(difference, numbers), partial(deviation, numbers)
 
     def prepare(self) -> None:
-        """Has both methods compiled, which must not happen in a tick."""
-        still = self.identity, np.zeros(self.dim), np.zeros(self.dim)
+        """Compile both methods, which must not happen within a tick."""
+        rest = self.identity, np.zeros(self.dim), np.zeros(self.dim)
         self.difference(self.identity, self.identity)
-        self.deviation(still, still, 0.0)
+        self.deviation(rest, rest, 0.0)
 
     def difference(self, x: Array, x_d: Array) -> Array:
-        """x - x_d of single values; for rotations log(R R_d'), shape (dim,)."""
+        """Return x - x_d of single values; log(R R_d') for rotations, shape (dim,)."""
         return self._functions[0](np.array(x), np.array(x_d))
 
     def deviation(
         self, motion: ValueMotion, before: ValueMotion, dt: float
     ) -> tuple[Array, Array]:
-        """Difference and its rate between a motion and where another one led `dt` s later."""
+        """Return the difference, and its rate, of a motion from an extrapolated earlier one."""
         x, velocity = np.array(motion[0]), np.array(motion[1])
         x_b, velocity_b, acceleration_b = (np.array(item) for item in before)
         return self._functions[1](x, velocity, x_b, velocity_b, acceleration_b, dt)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which subtask plays which role in a structured team, and where its numbers are."""
+"""Roles of the subtasks in a structured team, and indices of their coordinates."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,17 +20,17 @@ from noninteract_ros.team.team import Team
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Roles:
-    """What the subtasks of a stack do: a mean, the edges of a tree, and chosen joints.
+    """Roles of the subtasks in a stack: a mean, the edges of a tree, and chosen joints.
 
     Attributes:
         axes: Axes in use.
         weights: Weights of the mean tool point, shape (N,).
         rotation: Mean orientation, or None.
         offsets: Constant rotations of the tools, shape (N, 3, 3), or None.
-        steps: A walk over the edges, as `Plan` has it.
-        framed_points: Whether the edges' positions are seen from the mean's frame.
-        framed_rotations: Whether their rotations are.
-        joints: The chosen joints, by subtask.
+        steps: Traversal of the edges, see `Plan.steps`.
+        framed_points: True if the edges' positions are expressed in the frame of the mean.
+        framed_rotations: True if the edges' rotations are expressed in the frame of the mean.
+        joints: Chosen joints, by subtask.
     """
 
     axes: tuple[str, ...]
@@ -59,7 +59,7 @@ class Roles:
 
     @classmethod
     def of(cls, team: Team, stack: SubtaskStack) -> "Roles | None":
-        """Roles of the subtasks; None where they do not fit."""
+        """Return the roles of the subtasks; None if the stack does not have this structure."""
         found = [task.mixing for task in stack.subtasks]
         means = [item for item in found if isinstance(item, MeanMixing)]
         edges = [item for item in found if isinstance(item, EdgeMixing)]
@@ -90,12 +90,19 @@ class Roles:
             return None
         weights = mean_points[0].weights if mean_points else np.zeros(len(team.robots))
         return cls(
-            axes, weights, rotation, offsets, steps, framed_points, framed_rotations, joints
+            axes=axes,
+            weights=weights,
+            rotation=rotation,
+            offsets=offsets,
+            steps=steps,
+            framed_points=framed_points,
+            framed_rotations=framed_rotations,
+            joints=joints,
         )
 
 
 def _walk(edges: Sequence[EdgeMixing], count: int) -> Indices | None:
-    """The walk of `Plan.steps`; None if the edges are no tree over all robots."""
+    """Return the traversal for `Plan.steps`; None if the edges are no tree over all robots."""
     pairs = edges[0].pairs
     if len(pairs) != count - 1 or any(item.pairs != pairs for item in edges):
         return None
@@ -104,7 +111,7 @@ def _walk(edges: Sequence[EdgeMixing], count: int) -> Indices | None:
         around[first].append((edge, second, -1))
         around[second].append((edge, first, 1))
     reached, steps = [0], []
-    for robot in reached:  # It grows meanwhile.
+    for robot in reached:  # Grows during the traversal.
         for edge, other, side in around[robot]:
             if other not in reached:
                 reached.append(other)
@@ -119,7 +126,7 @@ def _same(first: Array | None, second: Array | None) -> bool:
 
 
 def _square(team: Team, h: int, joints: Sequence[JointMixing]) -> bool:
-    """Whether each robot has as many coordinates as joints."""
+    """Return True if each robot has as many coordinates as joints."""
     chosen = [place for item in joints for place in item.in_v]
     own = [
         h + sum(part.start <= place < part.stop for place in chosen)
@@ -136,7 +143,7 @@ def value_indices(stack: SubtaskStack) -> tuple[Indices, Indices]:
 
 
 def coordinates(team: Team, stack: SubtaskStack, roles: Roles, robots: RobotTerms) -> Coordinates:
-    """Where the coordinates of the subtasks are, stacked and robot by robot."""
+    """Return the indices of the subtasks' coordinates, stacked and robot by robot."""
     mean, edges, joints = _by_role(stack, stack.slices)
     m, h = robots.m, len(roles.axes) + 3 * (roles.rotation is not None)
     used = [h] * len(team.robots)
@@ -150,19 +157,21 @@ def coordinates(team: Team, stack: SubtaskStack, roles: Roles, robots: RobotTerm
     by_robot = np.lexsort((chosen // m, owner[joints]))
     order = [np.hstack(mean).ravel(), np.hstack(edges).ravel(), joints[by_robot]]
     plan = Plan(
-        np.concatenate(order),
-        owner,
-        chosen[by_robot],
-        robots.joints,
-        roles.steps,
-        roles.framed_points or roles.framed_rotations,
-        _parts(stack, len(roles.axes), h),
+        order=np.concatenate(order),
+        owner=owner,
+        chosen=chosen[by_robot],
+        joints=robots.joints,
+        steps=roles.steps,
+        framed=roles.framed_points or roles.framed_rotations,
+        parts=_parts(stack, len(roles.axes), h),
     )
-    return Coordinates(h, plan, stack.slices, team.velocity_slices, chosen)
+    return Coordinates(
+        h=h, plan=plan, slices=stack.slices, own=team.velocity_slices, chosen=chosen
+    )
 
 
 def _parts(stack: SubtaskStack, a: int, h: int) -> Indices:
-    """What each subtask has of the sorted coordinates, see `Plan.parts`."""
+    """Return the share of each subtask in the sorted coordinates, see `Plan.parts`."""
     rows, joints = [], 0
     for task in stack.subtasks:
         if _is(task, JointMixing):
@@ -177,7 +186,7 @@ def _parts(stack: SubtaskStack, a: int, h: int) -> Indices:
 def _by_role(
     stack: SubtaskStack, slices: Sequence[slice]
 ) -> tuple[list[Indices], list[Indices], Indices]:
-    """Indices of mean and edges, each of positions and rotations by element, and of joints."""
+    """Return the indices of mean and edges, each for positions and rotations, and of joints."""
     count = max(len(task.elements) for task in stack.subtasks if _is(task, EdgeMixing))
     none = np.zeros((count, 0), dtype=np.intp)
     mean, edges, joints = [none[:1], none[:1]], [none, none], [none[0]]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The team robot by robot: what of M, C and the Jacobians is not zero, without the rest."""
+"""Dynamics and tool Jacobians robot by robot, without the zero blocks of the team's matrices."""
 
 import numpy as np
 import pinocchio as pin
@@ -12,17 +12,17 @@ from noninteract_ros.team.team import Team
 
 
 class RobotTerms:
-    """Has Pinocchio find the terms of N robots with at most m joints, one robot after the other.
+    """Terms of N robots with at most m joints, computed by Pinocchio one robot at a time.
 
-    Robots with fewer joints than m have ones on the diagonal of M, zeros elsewhere. On a team of
-    prismatic joints nothing but the tool points changes, and Pinocchio is asked once.
+    Robots with fewer joints than m have ones on the diagonal of M, zeros elsewhere. For a team of
+    prismatic joints only the tool points change, and Pinocchio is called once.
 
     Args:
         team: The robots.
 
     Attributes:
         m: Largest number of joints of a robot.
-        joints: Place of each of the team's joints among N m padded ones, shape (n,).
+        joints: Index of each of the team's joints among N m padded ones, shape (n,).
         poses: Frames of the tools' joints, with twists at the world's origin, of `evaluate`.
     """
 
@@ -33,11 +33,11 @@ class RobotTerms:
         self.m = m
         self.joints: Indices = np.concatenate([k * m + np.arange(n) for k, n in enumerate(sizes)])
         self.poses = Poses(
-            np.zeros((N, 6, m)),
-            np.zeros((N, 6, m)),
-            np.zeros((N, 3)),
-            np.zeros((N, 3, 3)),
-            np.zeros((N, 6)),
+            jacobians=np.zeros((N, 6, m)),
+            rates=np.zeros((N, 6, m)),
+            positions=np.zeros((N, 3)),
+            rotations=np.zeros((N, 3, 3)),
+            twists=np.zeros((N, 6)),
         )
         self._start = np.zeros((ROBOT_ARRAYS, N, m, m))
         self._start[0] = np.eye(m)
@@ -57,7 +57,7 @@ class RobotTerms:
             self._constant = terms, g, [array.copy() for array in self.poses]
 
     def _add(self, k: int, model: pin.Model, tool: int, in_q: slice, in_v: slice) -> None:
-        """Data of one robot; Pinocchio's arrays are looked at where they are."""
+        """Add the data of one robot; views of Pinocchio's arrays avoid copies."""
         data, frame = model.createData(), model.frames[tool]
         joint = frame.parentJoint
         self._translations[k] = frame.placement.translation
@@ -67,23 +67,29 @@ class RobotTerms:
                 self._moves[k, model.joints[number].idx_v] = 1.0
         pose, n = data.oMi[joint], model.nv
         square = (array.reshape(n, n, order="F") for array in (data.M, data.C))
-        wide = (
-            array.reshape(6, n, order="F") for array in (data.J, data.dJ)
-        )  # Of one joint: (6,).
+        # Pinocchio's J of a single joint has shape (6,).
+        wide = (array.reshape(6, n, order="F") for array in (data.J, data.dJ))
         views = *square, *wide, pose.translation, pose.rotation
         self._parts.append((model, data, in_q, in_v, views))
 
     def tools(self, rows: Indices, rotates: bool, offsets: Array | None, chosen: Array) -> Tools:
-        """What the tools have at all states.
+        """Return the constants of the tools.
 
         Args:
             rows: Axes in use, out of 0, 1 and 2.
-            rotates: Whether the tools' rotations count.
-            offsets: Constant rotations that they are taken with, shape (N, 3, 3), or None.
+            rotates: True if the tools' rotations are used.
+            offsets: Constant rotations of the tools, shape (N, 3, 3), or None.
             chosen: T of the chosen joints and of the padding, shape (N, m, m).
         """
-        turned = self._rotations if offsets is None else self._rotations @ offsets
-        return Tools(rows, rotates, self._translations, turned, self._moves, chosen)
+        rotations = self._rotations if offsets is None else self._rotations @ offsets
+        return Tools(
+            rows=rows,
+            rotates=rotates,
+            translations=self._translations,
+            rotations=rotations,
+            moves=self._moves,
+            chosen=chosen,
+        )
 
     def evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
         """Return blocks of `array_parts.RobotArrays` with M and C, and gravity torque, (n,)."""
@@ -92,13 +98,14 @@ class RobotTerms:
         terms, g, poses = self._constant
         for array, constant in zip(self.poses, poses, strict=True):
             array[:] = constant
-        way = np.zeros((len(terms[0]), self.m, 1))
-        way.reshape(-1)[self.joints] = q
+        padded_q = np.zeros((len(terms[0]), self.m, 1))
+        padded_q.reshape(-1)[self.joints] = q
         positions = self.poses.positions
-        positions += (self.poses.jacobians[:, :3] @ way)[..., 0]
+        positions += (self.poses.jacobians[:, :3] @ padded_q)[..., 0]
         return terms.copy(), g
 
     def _evaluate(self, q: Array, v: Array) -> tuple[Array, Array]:
+        """Compute the terms with Pinocchio."""
         blocks = self._start.copy()
         for k, (model, data, in_q, in_v, views) in enumerate(self._parts):
             q_k, v_k = q[in_q], v[in_v]

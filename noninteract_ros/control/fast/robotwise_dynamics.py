@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The law's terms robot by robot, at a cost linear in the number of robots.
+"""Terms of the law robot by robot, at a cost linear in the number of robots.
 
-The stacked Jacobian is J = A T: T has one square block for each robot, to its tool's velocity and
-its chosen joints, and A mixes the tools as `kernels.array_parts.MixingArrays` has it and leaves
-the joints alone. Each robot k has h coordinates of its tool: the velocity of its tool point along
-the axes in use, and its angular velocity in axes of the tool. With them the rotation of a pair
-turns with R_a (omega_a - omega_b), a plain difference like that of the points. No matrix over the
-whole team is formed: with L = T^-T M T^-1, which has a block for each robot too,
+The stacked Jacobian is J = A T: T has one square block for each robot, which maps its joint
+velocities to its tool's velocity and its chosen joints, and A mixes the tools, see
+`kernels.array_parts.MixingArrays`, and leaves the joints unchanged. Each robot k has h tool
+coordinates: the velocity of its tool point along the axes in use, and its angular velocity in axes
+of the tool. In these axes the rotation of a pair has the rate R_a (omega_a - omega_b), a
+difference like that of the points. No matrix over the whole team is formed: with L = T^-T M T^-1,
+which has a block for each robot as well,
 
     mean       M_c = B' L B of the columns B of A^-1, at most six
-    joints     M_p is L's own rows and columns, since nothing else moves
-    edges      M_r y = f is the least of w' L w / 2 - f' y over all tool motions w that keep the
-               mean, y = A_r w: one block for each robot and as many multipliers as the mean has
+    joints     M_p has the joints' rows and columns of L, since nothing else moves
+    edges      M_r y = f is the minimum of w' L w / 2 - f' y over all tool motions w that keep
+               the mean, y = A_r w: one block for each robot and as many multipliers as the mean
+               has coordinates
 
-All numbers equal those of the dense `TaskDynamics` to rounding; they are worked out in machine
+All results equal those of the dense `TaskDynamics` up to rounding. They are computed in machine
 code, `kernels.task`, with one call for each method.
 """
 
@@ -30,13 +32,13 @@ from noninteract_ros.control.law.decoupling import TaskDynamics, task_terms
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Coordinates:
-    """Where the coordinates of the subtasks are, stacked and robot by robot.
+    """Indices of the subtasks' coordinates, stacked and robot by robot.
 
     Attributes:
-        h: How many of a robot's coordinates its tool has.
-        plan: The same for compiled functions.
-        slices: Coordinates of each subtask.
-        own: Coordinates of each robot in a vector over the joints.
+        h: Number of tool coordinates of a robot.
+        plan: Index tables for compiled functions.
+        slices: Slice of each subtask in a stacked vector.
+        own: Slice of each robot in a vector over the joints.
         chosen: Indices of the chosen joints among N m own coordinates, in the subtasks' order.
     """
 
@@ -48,15 +50,15 @@ class Coordinates:
 
 
 class RobotwiseDynamics(TaskDynamics):
-    """Task dynamics without matrices of the team; who asks for one gets it made.
+    """Task dynamics without matrices of the team, which are computed at the first access only.
 
     Args:
         coordinates: Coordinates of the subtasks.
         blocks: Terms of the robots, see `kernels.array_parts.RobotArrays`.
-        mixers: The mixing A, see `kernels.array_parts.Mixing`.
+        mixers: The mixing A, see `kernels.array_parts.MixingArrays`.
         G_inverse: Inverse of the sum of all G_k, shape (1, h, h).
         g: Gravity torque, shape (n,).
-        desired_inertias: For each subtask, shape (p_i,), or None for its own.
+        desired_inertias: Desired inertia of each subtask, shape (p_i,); None for its own.
     """
 
     def __init__(
@@ -93,20 +95,20 @@ class RobotwiseDynamics(TaskDynamics):
     _inverse: tuple[Plan, Array, Array, Array]
 
     def __getattr__(self, name: str) -> object:
-        """Matrices of the team, the first time that one is asked for."""
+        """Compute the matrices of the team at the first access to one of them."""
         if name not in {item.name for item in fields(TaskDynamics)}:
             raise AttributeError(name)
         M, C = self._joined(self.blocks[0]), self._joined(self.blocks[1])
-        still = np.zeros_like(self.g)
-        J = np.column_stack([self.velocity(column) for column in np.eye(len(still))])
-        J_rate = np.column_stack([self.acceleration_of(u, still) for u in np.eye(len(still))])
+        zero = np.zeros_like(self.g)
+        J = np.column_stack([self.velocity(column) for column in np.eye(len(zero))])
+        J_rate = np.column_stack([self.acceleration_of(u, zero) for u in np.eye(len(zero))])
         dense = task_terms(M, C, self.g, J, J_rate, self.slices, self.desired)
         for item in fields(TaskDynamics):
             object.__setattr__(self, item.name, getattr(dense, item.name))
         return getattr(dense, name)
 
     def _joined(self, blocks: Array) -> Array:
-        """Blocks of the robots on a diagonal, shape (n, n)."""
+        """Return the block-diagonal matrix of the robots' blocks, shape (n, n)."""
         result = np.zeros((len(self.g), len(self.g)))
         for block, part in zip(blocks, self.coordinates.own, strict=True):
             size = part.stop - part.start
@@ -114,11 +116,11 @@ class RobotwiseDynamics(TaskDynamics):
         return result
 
     def warm_up(self) -> None:
-        """Has every method compiled, which must not happen in a tick."""
-        some = np.zeros_like(self.g)
-        for pair in (self.acceleration_of, self.joint_acceleration, self.torque):
-            pair(some, some)
-        for single in (
+        """Compile every method, which must not happen within a tick."""
+        vector = np.zeros_like(self.g)
+        for binary in (self.acceleration_of, self.joint_acceleration, self.torque):
+            binary(vector, vector)
+        for unary in (
             self.velocity,
             self.coriolis_force,
             self.natural_coriolis_force,
@@ -129,67 +131,67 @@ class RobotwiseDynamics(TaskDynamics):
             self.divide_by_inertias,
             self.decoupled_external_force,
         ):
-            single(some)
+            unary(vector)
         _ = self.inverse_sizes
 
     @property
     def inverse_sizes(self) -> Array:
-        """The Frobenius norm of S, shape (1,)."""
+        """Frobenius norm of S, shape (1,)."""
         return np.array([task.inverse_norm(*self._inverse)])
 
     def velocity(self, v: Array) -> Array:
-        """J v, shape (n,)."""
+        """Return J v, shape (n,)."""
         return task.velocity(*self._shared, v)
 
     def acceleration_of(self, v: Array, joint_acceleration: Array) -> Array:
-        """J a + (dJ/dt) v, shape (n,)."""
+        """Return J a + (dJ/dt) v, shape (n,)."""
         return task.acceleration_of(*self._shared, v, joint_acceleration)
 
     def joint_acceleration(self, v: Array, task_acceleration: Array) -> Array:
-        """S (a - (dJ/dt) v), shape (n,)."""
+        """Return S (a - (dJ/dt) v), shape (n,)."""
         return task.joint_acceleration(*self._inverse, v, task_acceleration)
 
     def torque(self, v: Array, joint_acceleration: Array) -> Array:
-        """M a + C v + g, shape (n,)."""
+        """Return M a + C v + g, shape (n,)."""
         return task.torque(self.coordinates.plan, self.blocks, self.g, v, joint_acceleration)
 
     def coriolis_force(self, e_rate: Array) -> Array:
-        """C~_i e_rate_i of every subtask, shape (n,)."""
+        """Return C~_i e_rate_i of every subtask, shape (n,)."""
         force = task.coriolis_force(*self._inverse, e_rate)
         for part, _ in self._desired_parts:
             force[part] = 0.0
         return force
 
     def natural_coriolis_force(self, e_rate: Array) -> Array:
-        """mu e_rate, shape (n,)."""
+        """Return mu e_rate, shape (n,)."""
         return task.natural_coriolis_force(*self._inverse, e_rate)
 
     def force_of(self, torque: Array) -> Array:
-        """S' tau = A^-T T^-T tau, shape (n,)."""
+        """Return S' tau = A^-T T^-T tau, shape (n,)."""
         return task.force_of(*self._inverse, torque)
 
     def multiply_by_inertia(self, acceleration: Array) -> Array:
-        """Lambda a = A^-T L A^-1 a, shape (n,)."""
+        """Return Lambda a = A^-T L A^-1 a, shape (n,)."""
         return task.multiply_by_inertia(*self._inverse, acceleration)
 
     def divide_by_inertia(self, force: Array) -> Array:
-        """Lambda^-1 f = A L^-1 A' f, shape (n,)."""
+        """Return Lambda^-1 f = A L^-1 A' f, shape (n,)."""
         return task.divide_by_inertia(*self._shared, force)
 
     def divide_by_inertias(self, force: Array) -> Array:
-        """M_i^-1 f_i of every subtask, shape (n,)."""
+        """Return M_i^-1 f_i of every subtask, shape (n,)."""
         result = divide_by_inertias(*self._shared, force)
         for part, desired in self._desired_parts:
             result[part] = force[part] / desired
         return result
 
     def multiply_by_inertias(self, acceleration: Array) -> Array:
-        """M_i a_i of every subtask, shape (n,)."""
+        """Return M_i a_i of every subtask, shape (n,)."""
         result = task.multiply_by_inertias(*self._inverse, acceleration)
         for part, desired in self._desired_parts:
             result[part] = desired * acceleration[part]
         return result
 
     def decoupled_external_force(self, external_torque: Array) -> Array:
-        """M_s J M^-1 tau_e, shape (n,)."""
+        """Return M_s J M^-1 tau_e, shape (n,)."""
         return self.multiply_by_inertias(task.acceleration_under(*self._shared, external_torque))

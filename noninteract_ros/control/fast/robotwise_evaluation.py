@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Finds out whether a team's subtasks have the structure of `structured`, and evaluates it."""
+"""Detection and evaluation of teams with the structure of `robotwise_dynamics`."""
 
 import numpy as np
 
@@ -22,12 +22,12 @@ from noninteract_ros.team.team import Team
 
 
 class RobotwiseEvaluator:
-    """A team whose subtasks are a mean, the edges of a tree, and chosen joints.
+    """Evaluator of a team whose subtasks are a mean, the edges of a tree, and chosen joints.
 
     Args:
         team: The robots.
-        stack: Their subtasks.
-        roles: What `Roles.of` found.
+        stack: Subtasks of the team.
+        roles: Roles of the subtasks, from `Roles.of`.
     """
 
     def __init__(self, team: Team, stack: SubtaskStack, roles: Roles) -> None:
@@ -44,12 +44,12 @@ class RobotwiseEvaluator:
 
     @classmethod
     def of(cls, team: Team, stack: SubtaskStack) -> "RobotwiseEvaluator | None":
-        """The structure of a team; None if it has none."""
+        """Return the evaluator of a team; None if its subtasks do not have this structure."""
         roles = Roles.of(team, stack)
         return cls(team, stack, roles) if roles is not None else None
 
     def _chosen_rows(self, roles: Roles) -> Array:
-        """T of the chosen joints and of the padding, zero elsewhere, shape (N, m, m)."""
+        """Return T of the chosen joints and the padding, zero elsewhere, shape (N, m, m)."""
         count, m, h = len(self._team.robots), self._robots.m, self._coordinates.h
         T = np.tile(np.eye(m), (count, 1, 1))
         T[:, :h] = 0.0
@@ -60,8 +60,8 @@ class RobotwiseEvaluator:
         return T
 
     def evaluate(self, q: Array, v: Array, inertias: DesiredInertias) -> Evaluation:
-        """Everything at a state, with the subtasks' desired inertias."""
-        v = np.array(v)  # To numba an array that is only for reading is another kind.
+        """Evaluate all terms at a state, with the subtasks' desired inertias."""
+        v = np.array(v)  # A read-only array would compile another specialisation.
         x, dynamics = self._evaluate(q, v, inertias)
         state = LazyTeamState(self._team, q, v, dynamics.g)
         return Evaluation(state, LazySubtaskState(x, dynamics), dynamics)
@@ -69,7 +69,7 @@ class RobotwiseEvaluator:
     def _evaluate(
         self, q: Array, v: Array, inertias: DesiredInertias
     ) -> tuple[Array, RobotwiseDynamics]:
-        """Values and task dynamics at a state."""
+        """Return values and task dynamics at a state."""
         plan, poses, h = self._coordinates.plan, self._robots.poses, self._coordinates.h
         blocks, g = self._robots.evaluate(q, v)
         robot_terms(plan, self._tools, poses, blocks, v)
@@ -80,5 +80,5 @@ class RobotwiseEvaluator:
         return x, RobotwiseDynamics(self._coordinates, blocks, mixers, G_inverse, g, inertias)
 
     def again(self, seen: Evaluation, inertias: DesiredInertias) -> TaskDynamics:
-        """Task dynamics of the same state with other desired inertias."""
+        """Return the task dynamics of the same state with other desired inertias."""
         return self._evaluate(seen.state.q, seen.state.v, inertias)[1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Impedance of the subtasks: potentials, damping and desired inertia of (29) and (30)."""
+"""Impedance of the subtasks: potential, damping and desired inertia of (29) and (30)."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -18,61 +18,63 @@ class ImpedanceSettings:
     """Configuration of one subtask's impedance.
 
     Each list has one number for all coordinates, one per axis of an element, or one per axis of
-    each element. A rotation has one number, after those of its element's axes: with the same
-    stiffness about all axes, and only then, its torque is the exact gradient of a potential.
+    each element. A rotation has one number, after those of its element's axes: only for the same
+    stiffness about all axes is its torque the exact gradient of a potential.
     """
 
     stiffness: tuple[float, ...] = key("Stiffness [N/m; N m/rad]", minimum=0.0, live=True)
     damping: tuple[float, ...] = key("Damping [N s/m; N m s/rad]", positive=True, live=True)
     inertia: tuple[float, ...] = key(
-        "Desired inertia [kg; kg m^2], remark 2; by default the team's own, M_i = S_i' M S_i",
+        "Desired inertia, remark 2 [kg; kg m^2]; by default that of the team, M_i = S_i' M S_i",
         (),
         positive=True,
         live=True,
     )
     potential: str = key(
-        "Shape of the potential; saturating bounds each coordinate's force, and the torque of each"
-        " rotation, by max_force",
+        "Shape of the potential: linear, or saturating, which bounds each coordinate's force, and"
+        " each rotation's torque, by max_force",
         "linear",
         choices=("linear", "saturating"),
     )
     max_force: tuple[float, ...] = key(
-        "Bound of a saturating potential's force [N; N m]", (), positive=True, live=True
+        "Force bound of a saturating potential [N; N m]", (), positive=True, live=True
     )
     force: tuple[float, ...] = key(
-        "Force that the subtask is to press with, beyond its impedance [N; N m]", (), live=True
+        "Desired contact force, in addition to the impedance [N; N m]; by default none",
+        (),
+        live=True,
     )
     force_gain: tuple[float, ...] = key(
-        "Rate at which the force that is felt is regulated to it [1/s]; by default not at all",
+        "Rate of the regulation of the measured force to `force` [1/s]; by default none",
         (),
         minimum=0.0,
         live=True,
     )
     force_bound: tuple[float, ...] = key(
-        "Bound of what regulation adds to the force [N; N m]", (10.0,), positive=True, live=True
+        "Bound of the force added by the regulation [N; N m]", (10.0,), positive=True, live=True
     )
 
 
-def _none() -> Array:
+def _empty() -> Array:
     return np.zeros(0)
 
 
 @dataclass(frozen=True, slots=True)
 class Impedance:
-    """The gains of all subtasks, stacked.
+    """Stacked gains of all subtasks.
 
     Attributes:
         stiffness: K, diagonal, shape (n,) [N/m].
         damping: D, diagonal, shape (n,) [N s/m].
         max_force: Bound of each coordinate's spring force, shape (n,) [N]; inf where linear.
         inertias: Desired inertia of each subtask, shape (p_i,) [kg], or None for its own.
-        rotations: Coordinates of the rotations, shape (r, 3); None without any. The three of one
-            have the same stiffness and bound, and a potential of the angle |e|: `Layout` proves
-            that its gradient is exact.
-        goal: Force to press with, shape (n,) [N]; empty without any.
-        goal_gain: Rates of its regulation, shape (n,) [1/s].
-        goal_bound: Bounds of what regulation adds, shape (n,) [N].
-        linear: Whether no force is bounded; the same numbers are then found with less work.
+        rotations: Coordinates of the rotations, shape (r, 3); None without any. Those of one
+            rotation have the same stiffness and bound, and a potential of the angle |e|, whose
+            gradient is exact, see `Layout`.
+        goal: Desired force, shape (n,) [N]; empty without any.
+        goal_gain: Rates of the force regulation, shape (n,) [1/s].
+        goal_bound: Bounds of the regulation's output, shape (n,) [N].
+        linear: True if no force is bounded; then the same results are computed faster.
     """
 
     stiffness: Array
@@ -80,28 +82,29 @@ class Impedance:
     max_force: Array
     inertias: tuple[Array | None, ...]
     rotations: Array | None = None
-    goal: Array = field(default_factory=_none)
-    goal_gain: Array = field(default_factory=_none)
-    goal_bound: Array = field(default_factory=_none)
+    goal: Array = field(default_factory=_empty)
+    goal_gain: Array = field(default_factory=_empty)
+    goal_bound: Array = field(default_factory=_empty)
     linear: bool = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "linear", bool(np.isinf(self.max_force).all()))
 
     def force(self, e: Array) -> Array:
-        """h(e), the exact gradient of the potential, shape (n,) [N; N m]."""
+        """Return h(e), the exact gradient of the potential, shape (n,) [N; N m]."""
         linear = self.stiffness * e
         return linear if self.linear else linear / np.sqrt(1.0 + self._overload(linear))
 
     def feedback(self, e: Array, e_rate: Array) -> Array:
-        """D e_rate + h(e), shape (n,) [N; N m]."""
+        """Return D e_rate + h(e), shape (n,) [N; N m]."""
         return self.damping * e_rate + self.force(e)
 
     def potential(self, e: Array) -> Array:
-        """V(e) by coordinate, shape (n,) [J]: K e^2 / 2 where linear.
+        """Return V(e) by coordinate, shape (n,) [J]: K e^2 / 2 if linear.
 
-        Saturating: F^2/K (sqrt(1 + (K e / F)^2) - 1), written so that F = inf is the linear case.
-        The three of a rotation have the angle |e| under the root, and add up to its potential.
+        A saturating potential is F^2/K (sqrt(1 + (K e / F)^2) - 1), written so that F = inf is the
+        linear case. The three coordinates of a rotation have the angle |e| under the root, and add
+        up to its potential.
         """
         linear = self.stiffness * e
         if self.linear:
@@ -109,7 +112,7 @@ class Impedance:
         return linear * e / (1.0 + np.sqrt(1.0 + self._overload(linear)))
 
     def _overload(self, linear: Array) -> Array:
-        """Square of the linear force over its bound; for rotations that of the torque's size."""
+        """Return the squared ratio of force to bound, where a rotation has its torque's norm."""
         square = (linear / self.max_force) ** 2
         if self.rotations is not None:
             square[self.rotations] = square[self.rotations].sum(axis=1, keepdims=True)
@@ -119,27 +122,33 @@ class Impedance:
 def stack_impedance(
     subtasks: Sequence[Subtask], settings: Sequence[ImpedanceSettings]
 ) -> Impedance:
-    """Stacks the settings of all subtasks.
+    """Stack the settings of all subtasks.
 
     Raises:
         ScenarioError: A list of numbers does not fit its subtask.
     """
     pairs = list(zip(subtasks, settings, strict=True))
+
+    def stacked(name: str) -> Array:
+        parts = [_or_zero(task, name, getattr(item, name)) for task, item in pairs]
+        return np.concatenate(parts)
+
     return Impedance(
-        np.concatenate(
+        stiffness=np.concatenate(
             [per_coordinate(task, "stiffness", item.stiffness) for task, item in pairs]
         ),
-        np.concatenate([per_coordinate(task, "damping", item.damping) for task, item in pairs]),
-        np.concatenate([_max_force(task, item) for task, item in pairs]),
-        tuple(
+        damping=np.concatenate(
+            [per_coordinate(task, "damping", item.damping) for task, item in pairs]
+        ),
+        max_force=np.concatenate([_max_force(task, item) for task, item in pairs]),
+        inertias=tuple(
             per_coordinate(task, "inertia", item.inertia) if item.inertia else None
             for task, item in pairs
         ),
-        _rotations(subtasks),
-        *(
-            np.concatenate([_or_zero(task, name, getattr(item, name)) for task, item in pairs])
-            for name in ("force", "force_gain", "force_bound")
-        ),
+        rotations=_rotations(subtasks),
+        goal=stacked("force"),
+        goal_gain=stacked("force_gain"),
+        goal_bound=stacked("force_bound"),
     )
 
 
@@ -159,13 +168,13 @@ def _max_force(subtask: Subtask, settings: ImpedanceSettings) -> Array:
 
 
 def per_coordinate(subtask: Subtask, name: str, values: Sequence[float]) -> Array:
-    """Numbers for each coordinate of a subtask, shape (p,), from one or from some per element.
+    """Expand numbers to one per coordinate of a subtask, shape (p,).
 
     Args:
         subtask: The subtask.
-        name: Key that holds the numbers, for error messages.
-        values: One for all; or one per axis of an element, then one for its rotation, if it has
-            one; or that for each element.
+        name: Key of the numbers, for error messages.
+        values: One number for all coordinates; or one per axis of an element, followed by one for
+            its rotation, if any; or the same for each element.
 
     Raises:
         ScenarioError: Any other count.

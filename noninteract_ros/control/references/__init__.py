@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""References of the subtasks: inputs, authority and the desired motion that results."""
+"""References of the subtasks: inputs, authority and the resulting desired motion."""

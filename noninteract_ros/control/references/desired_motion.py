@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The desired motion of one subtask: continuous whoever asks for it, and at rest when nobody does.
+"""Desired motion of one subtask: continuous across changes of source, at rest without one.
 
 Set-points, rates, take-overs and stops are shaped by ruckig within bounds of velocity,
 acceleration and jerk. A full reference passes unchanged once it has been taken over. Rotations are
-shaped as rotation vectors from where they are to go, which leads along SO(3) with the exact
-derivatives; their angular velocity is never faster than the rotation vector changes.
+shaped as rotation vectors relative to the goal, which gives motions on SO(3) with exact
+derivatives; their angular velocity never exceeds the rate of the rotation vector.
 """
 
 from dataclasses import replace
@@ -17,14 +17,14 @@ from noninteract_ros.control.references.inputs import MotionInput, Rate, Target
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.reference import Reference
 
-LONGEST = 1000.0  # [s] how far ahead a motion is planned
+HORIZON = 1000.0  # [s] largest duration of a planned motion
 
 
 class MotionShaper:
-    """One step at a time towards a state, within limits; all numbers are plain.
+    """Motion of scalars towards a state, one step at a time, within limits.
 
-    An acceleration beyond the limit comes back with bounded jerk. Where no way to a set-point can
-    be planned the motion slows down, and where not even that can be, it rests.
+    An acceleration beyond the limit is reduced with bounded jerk. If no motion to a set-point can
+    be planned, the motion decelerates; if that cannot be planned either, it stops.
 
     Args:
         limits: Bounds of velocity, acceleration and jerk, shape (3, p).
@@ -38,9 +38,9 @@ class MotionShaper:
         self._max_velocity = limits[0]
 
     def towards(self, start: Reference, target: Target, step: float) -> tuple[Reference, bool]:
-        """State `step` seconds on the way to a set-point, and whether it is reached."""
+        """Return the state `step` [s] later towards a set-point, and True if it is reached."""
         self._input.control_interface = ControlInterface.Position
-        reach = LONGEST * self._max_velocity
+        reach = HORIZON * self._max_velocity
         away = np.clip(target.position - start.position, -reach, reach)
         near = np.abs(away) < reach
         self._input.target_position = np.where(near, target.position, start.position + away)
@@ -48,13 +48,14 @@ class MotionShaper:
         return planned or self.at_rate(start, np.zeros_like(start.velocity), step)
 
     def at_rate(self, start: Reference, rate: Array, step: float) -> tuple[Reference, bool]:
-        """State `step` seconds on the way to a velocity, and whether it is reached."""
+        """Return the state `step` [s] later towards a velocity, and True if it is reached."""
         self._input.control_interface = ControlInterface.Velocity
         return self._advance(start, rate, step) or (Reference.at_rest(start.position), False)
 
     def _advance(
         self, start: Reference, speed: Array, step: float
     ) -> tuple[Reference, bool] | None:
+        """Advance ruckig by one step; return None if it fails."""
         self._generator.delta_time = step
         self._input.current_position = start.position
         self._input.current_velocity = start.velocity
@@ -62,7 +63,7 @@ class MotionShaper:
         self._input.target_velocity = np.clip(speed, -self._max_velocity, self._max_velocity)
         try:
             result = self._generator.update(self._input, self._output)
-        except (RuckigError, ValueError):  # ValueError: it has no name for some of its failures.
+        except (RuckigError, ValueError):  # ValueError: unnamed results of ruckig.
             result = Result.Error
         if result not in (Result.Working, Result.Finished):
             return None
@@ -75,12 +76,13 @@ class MotionShaper:
 
 
 class AccelerationCarryOver:
-    """How much of an acceleration a motion goes on with after its source has left it.
+    """Acceleration that a motion keeps after its source has left it.
 
-    To lead an acceleration a back by the jerk j takes the velocity on by a^2 / (2 j). Twice of
-    what a motion within the limits can have, as where two of them part, is led back in any case;
-    more only as far as the velocity stays within its limit. What is beyond is cut at once: the
-    limits of jerk and velocity contradict each other there, and the motion would go far astray.
+    To reduce an acceleration a with the jerk j increases the velocity by a^2 / (2 j). An
+    acceleration up to twice that of motions within the limits, as in a difference of two of them,
+    is always reduced with bounded jerk; a larger one only while the velocity stays within its
+    limit. The excess is cut at once: there, the limits of jerk and velocity contradict each other,
+    and the motion would deviate far.
 
     Args:
         limits: Bounds of velocity, acceleration and jerk, shape (3, p).
@@ -88,12 +90,12 @@ class AccelerationCarryOver:
 
     def __init__(self, limits: Array) -> None:
         self._max_velocity, max_acceleration, self._max_jerk = limits
-        # From rest to full velocity no more is needed, however much is allowed.
+        # Largest acceleration in use from rest to full velocity, whatever the limit.
         needed = np.minimum(max_acceleration, np.sqrt(self._max_jerk * self._max_velocity))
         self._twice = np.maximum(max_acceleration, 2.0 * needed)
 
     def of(self, left: Reference, base: Reference | None = None) -> Reference:
-        """A motion with the acceleration that it goes on with, as seen from another one."""
+        """Return a motion with the acceleration that it keeps, relative to `base` if given."""
         velocity, acceleration = left.velocity, left.acceleration
         if base is not None:
             velocity, acceleration = velocity - base.velocity, acceleration - base.acceleration
@@ -105,13 +107,13 @@ class AccelerationCarryOver:
 
 
 class DesiredMotion:
-    """What a subtask is to do now.
+    """Desired motion of a subtask.
 
     Args:
         limits: Bounds of velocity, acceleration and jerk, shape (3, p).
-        direct: Whether a full reference is taken over at once, with the jump it brings, instead
-            of being approached from where the desired motion is.
-        layout: Layout of the subtask's values; plain numbers, if None.
+        direct: True to take over a full reference at once, with a jump; False to approach it from
+            the current desired motion.
+        layout: Layout of the subtask's values; scalars if None.
     """
 
     def __init__(self, limits: Array, direct: bool, layout: Layout | None = None) -> None:
@@ -127,17 +129,17 @@ class DesiredMotion:
         return self._now
 
     def hold_at(self, x: Array) -> None:
-        """Starts anew: at rest at x, shape (size,)."""
+        """Reset to rest at x, shape (size,)."""
         self._now = Reference.at_rest(x, self._layout)
         self._followed: Reference | None = None
         self._gap: Reference | None = None
         self._chart: tuple[Array, Reference] | None = None
 
     def advance(self, motion: MotionInput | None, step: float) -> Reference:
-        """Desired motion one tick later.
+        """Return the desired motion one tick later.
 
         Args:
-            motion: What the source in force asks for (a full reference as of this tick), or None.
+            motion: Input of the source in authority (a full reference as of this tick), or None.
             step: Time since the last tick [s].
         """
         if isinstance(motion, Reference):
@@ -168,10 +170,10 @@ class DesiredMotion:
         return Reference.at_rest(shaped.position, self._layout) if done else shaped
 
     def _towards(self, target: Target, step: float) -> tuple[Reference, bool]:
-        """Shapes in coordinates about the target's rotations, which are zero there.
+        """Shape the motion in local coordinates about the rotations of the target.
 
-        The coordinates are kept from tick to tick: ruckig fails now and then where a state that
-        it has made itself comes back with another rounding.
+        The target's rotations are zero in them. The coordinates are kept between ticks: ruckig
+        fails occasionally if a state that it returned comes back with different rounding.
         """
         layout = self._layout
         origin = Reference.at_rest(layout.origin(target.position), layout)
@@ -185,14 +187,14 @@ class DesiredMotion:
         return origin.plus(shaped, layout), done
 
     def _at_rate(self, rate: Array, step: float) -> tuple[Reference, bool]:
-        """Shapes in coordinates about the rotations that it has."""
+        """Shape the motion in local coordinates about the current rotations."""
         layout = self._layout
         origin = Reference.at_rest(layout.origin(self._now.position), layout)
         shaped, done = self._shaper.at_rate(self._now.minus(origin, layout), rate, step)
         return origin.plus(shaped, layout), done
 
     def _follow(self, motion: Reference, step: float) -> Reference:
-        """The reference plus a gap that closes smoothly; no gap in a direct take-over."""
+        """Return the reference plus a gap that closes smoothly; no gap in a direct take-over."""
         if self._direct:
             return motion
         if self._jumps(motion, step):
@@ -205,7 +207,7 @@ class DesiredMotion:
         return motion if self._gap is None else motion.plus(self._gap, self._layout)
 
     def _jumps(self, motion: Reference, step: float) -> bool:
-        """Whether a reference is new or leaves its own path by more than the limits allow."""
+        """Return True if a reference is new or deviates from its own path beyond the limits."""
         if self._followed is None:
             return True
         away, velocity = motion.deviation(self._followed, step, self._layout)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hand-overs of a subtask between human and autonomy that a scenario plans beforehand."""
+"""Planned hand-overs of a subtask between human and autonomy."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -9,15 +9,16 @@ from noninteract_ros.schema import join
 
 
 class HandOvers:
-    """Who is to take a subtask when; each once, so that others may be asked for in between.
+    """Schedule of hand-overs; each is applied once, so that authority may be changed in between.
 
     Args:
-        times: When, since the team's first state [s]; in wall time its clock began long before.
-        takers: Source that takes it, one for each time.
+        times: Times since the team's first state [s]; not absolute, as wall time has another
+            origin.
+        takers: Source that receives the subtask, one for each time.
         path: Dotted key of the subtask's block, for error messages.
 
     Raises:
-        ScenarioError: Times do not increase, or there are more or fewer than takers.
+        ScenarioError: Times do not increase, or the numbers of times and takers differ.
     """
 
     def __init__(self, times: Sequence[float], takers: Sequence[str], path: str) -> None:
@@ -30,16 +31,16 @@ class HandOvers:
         self.reset()
 
     def reset(self) -> None:
-        """The team's time starts anew."""
+        """Reset the schedule; the next time is that of the first state."""
         self._done = 0
-        self._began: float | None = None
+        self._start: float | None = None
 
     def due(self, now: float) -> str | None:
-        """Who takes the subtask at a time [s]; None where nothing changes."""
+        """Return the source that receives the subtask at a time [s]; None without a hand-over."""
         taker = None
-        self._began = now if self._began is None else self._began
-        passed = now - self._began + 1e-9
-        while self._done < len(self._plan) and self._plan[self._done][0] <= passed:
+        self._start = now if self._start is None else self._start
+        elapsed = now - self._start + 1e-9
+        while self._done < len(self._plan) and self._plan[self._done][0] <= elapsed:
             taker = self._plan[self._done][1]
             self._done += 1
         return taker

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a human or an autonomous source can ask of a subtask, and who is heard."""
+"""Inputs of human and autonomous sources to a subtask."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ from noninteract_ros.errors import InputError
 from noninteract_ros.subtasks.reference import Reference
 
 SOURCES = ("human", "autonomy")
-HORIZON = 1.0  # [s] how far ahead of the team's time an input may be stamped
+HORIZON = 1.0  # [s] largest lead of an input's stamp over the team's time
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """A set-point to reach within the subtask's limits.
+    """Set-point to reach within the subtask's limits.
 
     Attributes:
-        position: Where to go, shape (size,) [m; quaternions].
-        velocity: Velocity to have there, shape (p,) [m/s; rad/s].
+        position: Goal value, shape (size,) [m; quaternions].
+        velocity: Velocity at the goal, shape (p,) [m/s; rad/s].
     """
 
     position: Array
@@ -29,14 +29,14 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """A velocity to reach within the subtask's limits, shape (p,) [m/s; rad/s]."""
+    """Velocity to reach within the subtask's limits, shape (p,) [m/s; rad/s]."""
 
     velocity: Array
 
 
 @dataclass(frozen=True, slots=True)
 class Force:
-    """A force input tau~_c (remark 1), shape (p,) [N; N m]."""
+    """Force input tau~_c (remark 1), shape (p,) [N; N m]."""
 
     force: Array
 
@@ -45,10 +45,10 @@ MotionInput = Reference | Target | Rate
 
 
 class Source:
-    """The inputs of one source to one subtask, in the order of their stamps.
+    """Inputs of one source to one subtask, in the order of their stamps.
 
     Attributes:
-        complete_until: The source has said all it wants to say up to this time [s].
+        complete_until: Time up to which all inputs of the source were received [s].
     """
 
     def __init__(self) -> None:
@@ -59,10 +59,15 @@ class Source:
         self._force: tuple[float, Force] | None = None
 
     def receive(self, stamp: float, item: MotionInput | Force, now: float) -> None:
-        """Takes an input that is to hold from `stamp` on.
+        """Store an input that is valid from `stamp` on.
+
+        Args:
+            stamp: Stamp of the input [s].
+            item: Input.
+            now: The team's time [s].
 
         Raises:
-            InputError: The stamp goes back, or lies too far ahead of `now`.
+            InputError: The stamp decreases, or is too far ahead of `now`.
         """
         if isinstance(item, Force):
             self._append(self._forces, self._force, stamp, item, now)
@@ -82,23 +87,23 @@ class Source:
         queue.append((stamp, item))
 
     def mark_complete_until(self, stamp: float) -> None:
-        """Notes that the source has nothing new to say up to `stamp` [s]."""
+        """Record that the source has no further input up to `stamp` [s]."""
         self.complete_until = max(self.complete_until, stamp)
 
     def discard_inputs(self) -> None:
-        """Drops the inputs that have come so far."""
+        """Discard all inputs received so far."""
         self._motions.clear()
         self._forces.clear()
         self._motion = self._force = None
 
     def motion(self, now: float) -> tuple[float, MotionInput] | None:
-        """Newest motion whose stamp has come, with the stamp."""
+        """Return the newest motion whose stamp has been reached, with the stamp."""
         while self._motions and self._motions[0][0] <= now:
             self._motion = self._motions.popleft()
         return self._motion
 
     def force(self, now: float) -> tuple[float, Force] | None:
-        """Newest force whose stamp has come, with the stamp."""
+        """Return the newest force whose stamp has been reached, with the stamp."""
         while self._forces and self._forces[0][0] <= now:
             self._force = self._forces.popleft()
         return self._force

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Who leads a subtask: authority, silence and the desired motion that results."""
+"""Input of a subtask: authority, timeout and the resulting desired motion."""
 
 from dataclasses import dataclass
 from typing import TypeVar
@@ -22,25 +22,27 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class InputSettings:
-    """Configuration of how one subtask is led.
+    """Configuration of one subtask's input.
 
-    Lists have one number for all, or as `ImpedanceSettings` has them. A rotation's number bounds
-    each component of its rotation vector.
+    Lists have one number for all coordinates, or as many as those of `ImpedanceSettings`. The
+    number of a rotation bounds each component of its rotation vector.
     """
 
-    authority: str = key("Source in force", "hold", choices=AUTHORITIES, live=True)
-    timeout: float = key("Silence after which the subtask holds [s]", 0.5, positive=True)
+    authority: str = key("Source in authority", "hold", choices=AUTHORITIES, live=True)
+    timeout: float = key(
+        "Age of the last input after which the subtask holds [s]", 0.5, positive=True
+    )
     takeover: str = key(
-        "How a full reference is taken over: shaped from where the desired motion is, or direct,"
-        " with the jump it brings",
+        "Take-over of a full reference: shaped, a smooth approach from the current desired motion,"
+        " or direct, with a jump",
         "shaped",
         choices=("shaped", "direct"),
     )
     hand_over_times: tuple[float, ...] = key(
-        "When the subtask is handed over, since the team's first state [s]", (), minimum=0.0
+        "Times of planned hand-overs since the team's first state [s]", (), minimum=0.0
     )
     hand_over_to: tuple[str, ...] = key(
-        "Who takes it at each of these times", (), choices=AUTHORITIES
+        "Source that receives authority at each of these times", (), choices=AUTHORITIES
     )
     max_velocity: tuple[float, ...] = key(
         "Velocity bound of shaped motions [m/s; rad/s]", (1.0,), positive=True
@@ -59,13 +61,13 @@ class InputSettings:
 
 @dataclass(frozen=True, slots=True)
 class SubtaskCommand:
-    """What a subtask is asked to do at one tick.
+    """Command of a subtask at one tick.
 
     Attributes:
         reference: Desired motion.
-        force: Force input in force, shape (p,) [N].
-        source: Source that is followed, or `hold`.
-        silent: Whether the source in force has gone silent, or never spoke.
+        force: Force input, shape (p,) [N].
+        source: Source in authority, or `hold`.
+        silent: True if the source in authority has timed out, or has sent nothing yet.
     """
 
     reference: Reference
@@ -75,7 +77,7 @@ class SubtaskCommand:
 
     @property
     def leader(self) -> str:
-        """Who leads in fact: one that is silent only holds."""
+        """Source that leads: the one in authority, or `hold` while it is silent."""
         return "hold" if self.silent else self.source
 
 
@@ -83,9 +85,9 @@ class SubtaskInput:
     """Sources, authority and desired motion of one subtask.
 
     Attributes:
-        authority: Source in force; may be changed at any time.
+        authority: Source in authority; may be changed at any time.
         sources: Inputs by source.
-        max_jerk: Bound of shaped motions, shape (p,) [m/s^3; rad/s^3].
+        max_jerk: Jerk bound of shaped motions, shape (p,) [m/s^3; rad/s^3].
     """
 
     def __init__(self, subtask: Subtask, settings: InputSettings) -> None:
@@ -106,33 +108,35 @@ class SubtaskInput:
         self._force: Array = np.zeros(subtask.dim)
 
     def hold_at(self, x: Array) -> None:
-        """Holds at x, shape (size,), until the source in force speaks again."""
+        """Hold at x, shape (size,), until the source in authority sends an input."""
         self._desired.hold_at(x)
         self._force = np.zeros(self._layout.dim)
 
     def hold(self, now: float) -> SubtaskCommand:
-        """At rest where it is, whatever the sources say up to `now` [s]."""
-        self._take(now)
-        return SubtaskCommand(self._desired.now, self._force, "hold", False)
+        """Return the command to hold the desired position, and discard inputs due at `now` [s]."""
+        self._consume(now)
+        return SubtaskCommand(
+            reference=self._desired.now, force=self._force, source="hold", silent=False
+        )
 
     def discard_inputs(self) -> None:
-        """Drops every input that has come so far."""
+        """Discard all inputs received so far."""
         for source in self.sources.values():
             source.discard_inputs()
 
     def reset(self) -> None:
-        """Starts anew with sources that have never spoken."""
+        """Reset the sources and the planned hand-overs."""
         self.sources.update({name: Source() for name in SOURCES})
         self._hand_overs.reset()
 
     def advance(self, now: float, step: float) -> SubtaskCommand:
-        """What to do at this tick.
+        """Return the command of this tick.
 
         Args:
             now: The team's time [s].
             step: Time since the last tick [s].
         """
-        self._take(now)
+        self._consume(now)
         source = self.sources.get(self.authority)
         motion = self._fresh(source.motion(now), now) if source else None
         force = self._fresh(source.force(now), now) if source else None
@@ -141,27 +145,29 @@ class SubtaskInput:
             self._force = self._shaped(wanted, step)
         reference = self._desired.advance(self._as_of(now, *motion) if motion else None, step)
         silent = source is not None and motion is None and force is None
-        return SubtaskCommand(reference, self._force, self.authority, silent)
+        return SubtaskCommand(
+            reference=reference, force=self._force, source=self.authority, silent=silent
+        )
 
-    def _take(self, now: float) -> None:
-        """Takes what has come due, so that no input piles up, of whatever source."""
+    def _consume(self, now: float) -> None:
+        """Apply due hand-overs, and consume due inputs of all sources to bound their queues."""
         self.authority = self._hand_overs.due(now) or self.authority
         for source in self.sources.values():
             source.motion(now)
             source.force(now)
 
     def _fresh(self, newest: tuple[float, Item] | None, now: float) -> tuple[float, Item] | None:
-        """An input that is not older than the timeout."""
+        """Return an input unless it is older than the timeout."""
         return newest if newest is not None and now - newest[0] <= self._timeout else None
 
     def _shaped(self, wanted: Array, step: float) -> Array:
-        """The force input one tick later, within its bounds."""
+        """Return the force input one tick later, within its bounds."""
         bounded = np.clip(wanted, -self._max_force, self._max_force)
         change = self._max_force_rate * step
         return self._force + np.clip(bounded - self._force, -change, change)
 
     def _as_of(self, now: float, stamp: float, motion: MotionInput) -> MotionInput:
-        """What a motion that was given for `stamp` asks for now."""
+        """Return a motion stamped `stamp`, extrapolated to `now`."""
         if isinstance(motion, Reference):
             return motion.extrapolate(now - stamp, self._layout)
         return motion

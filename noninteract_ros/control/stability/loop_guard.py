@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether law and gains that are asked for would diverge where the team is."""
+"""Guard against laws and gains whose sampled loops would diverge."""
 
 import numpy as np
 
@@ -12,12 +12,12 @@ from noninteract_ros.team.team import Team
 
 
 class LoopGuard:
-    """Judges modes by their sampled loops, linearised at rest at a configuration.
+    """Check of a law and its gains by their sampled loops, linearised at rest.
 
     Args:
-        team: The robots; its own, as another thread may evaluate the controller's.
-        stack: Their subtasks.
-        rate: Ticks per second [Hz].
+        team: The robots, with data of their own if another thread evaluates the controller's.
+        stack: Subtasks of the team.
+        rate: Control rate [Hz].
     """
 
     def __init__(self, team: Team, stack: SubtaskStack, rate: float) -> None:
@@ -26,21 +26,21 @@ class LoopGuard:
     def rejection(
         self, q: Array, wanted: tuple[str, Impedance], in_force: tuple[str, Impedance]
     ) -> str:
-        """Why a change must not be made, and what would cure it; or an empty text.
+        """Return the reason to reject a change, with a remedy; empty if it is accepted.
 
-        A loop that diverges less than those in force is let through, so that gains which are far
-        too high can come down step by step.
+        A loop that diverges less than the current ones is accepted, so that gains which are far
+        too high can be reduced step by step.
 
         Args:
             q: Configuration, shape (nq,).
-            wanted: Law and gains that are asked for.
-            in_force: Law and gains until now.
+            wanted: Requested law and gains.
+            in_force: Current law and gains.
         """
         try:
             worst = max(self._loops(q, *wanted), key=_growth)
             if worst.stable or worst.growth <= max(map(_growth, self._loops(q, *in_force))):
                 return ""
-        except np.linalg.LinAlgError:  # In a singularity the law is not in force anyway.
+        except np.linalg.LinAlgError:  # At a singularity the law is faded out.
             return ""
         return f"law {wanted[0]}, {worst.name}: {worst.divergence()}"
 

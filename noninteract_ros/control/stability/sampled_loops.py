@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed loops of a team's subtasks, linearised at rest: their modes, and what sampling does."""
+"""Closed loops of a team's subtasks, linearised at rest: modes, and effect of sampling."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,28 +13,29 @@ from noninteract_ros.control.energy.gate import GATED
 from noninteract_ros.control.law.decoupling import TaskDynamics
 from noninteract_ros.control.law.impedance import Impedance
 
-TICKS_PER_TIME_CONSTANT = 10.0  # fewer make the sampled loop visibly another one than designed
-# Nobody designs the loop that closed gates leave, but it must damp: condition (C2) of the
+TICKS_PER_TIME_CONSTANT = 10.0  # with fewer, the sampled loop differs visibly from its design
+# The loop with closed gates is not a design choice, but it must be damped: condition (C2) of the
 # derivations, with a command that is one tick late.
 TICKS_WITHOUT_DECOUPLING = 3.0
-MARGINAL = 1e-9  # growth beyond 1 that rounding may cause where a mode neither grows nor decays
-STEP = 2.0**0.125  # factor between the rates and dampings that are tried as cures
-TRIALS = 80  # of them, up to a factor of 1024
+MARGINAL = 1e-9  # growth beyond 1 by rounding, of a mode that neither grows nor decays
+STEP = 2.0**0.125  # factor between the rates and dampings that are tried as remedies
+TRIALS = 80  # number of these factors, up to 1024
 
 
 @dataclass(frozen=True)
 class Loop:
-    """M d2e/dt2 + D de/dt + K e = 0 of one subtask, or of all where the law couples them.
+    """M d2e/dt2 + D de/dt + K e = 0 of one subtask, or of all if the law couples them.
 
-    Without what the team holds and touches, and for a saturating potential at small errors.
+    The loop does not include objects held or touched by the team; a saturating potential is
+    linearised at zero error.
 
     Attributes:
-        name: The subtask, or `all subtasks`.
+        name: Name of the subtask, or `all subtasks`.
         M: Inertia, shape (p, p) [kg].
         D: Damping, shape (p, p) [N s/m].
         K: Stiffness, shape (p, p) [N/m].
-        rate: Ticks per second [Hz].
-        enough: Ticks per time constant of the fastest mode that pass without a warning.
+        rate: Control rate [Hz].
+        min_ticks: Least ticks per time constant of the fastest mode without a warning.
     """
 
     name: str
@@ -42,7 +43,7 @@ class Loop:
     D: Array
     K: Array
     rate: float
-    enough: float = TICKS_PER_TIME_CONSTANT
+    min_ticks: float = TICKS_PER_TIME_CONSTANT
 
     @cached_property
     def inertia(self) -> Array:
@@ -51,29 +52,29 @@ class Loop:
 
     @cached_property
     def damping_ratios(self) -> Array:
-        """By mode of the undamped loop, ascending; none for a mode without stiffness.
+        """Damping ratio of each mode of the undamped loop with stiffness, ascending.
 
-        Damping couples these modes little; for p = 1 the ratio is exact.
+        The modes' coupling by damping is neglected; for p = 1 the ratio is exact.
         """
         squares, modes = eigh(self.K, self.M)
-        swings = squares > 0.0
+        oscillates = squares > 0.0
         damping = np.einsum("ik,ij,jk->k", modes, self.D, modes)
-        return np.asarray(np.sort(damping[swings] / (2.0 * np.sqrt(squares[swings]))))
+        return np.asarray(np.sort(damping[oscillates] / (2.0 * np.sqrt(squares[oscillates]))))
 
     @cached_property
     def _eigenvalues(self) -> Array:
-        """Of the loop in continuous time, shape (2 p,) [1/s]."""
+        """Eigenvalues of the loop in continuous time, shape (2 p,) [1/s]."""
         eye, zero = np.eye(len(self.M)), np.zeros_like(self.M)
         return np.linalg.eigvals(np.vstack([np.hstack([zero, eye]), self._feedback(1.0)]))
 
     @property
     def slowest(self) -> float:
-        """Smallest decay rate of its modes [1/s]."""
+        """Smallest decay rate of the modes [1/s]."""
         return float((-self._eigenvalues.real).min())
 
     @property
     def fastest(self) -> float:
-        """Largest magnitude of its eigenvalues [1/s]."""
+        """Largest magnitude of the eigenvalues [1/s]."""
         return float(np.abs(self._eigenvalues).max())
 
     @property
@@ -83,74 +84,78 @@ class Loop:
 
     @cached_property
     def growth(self) -> float:
-        """Largest factor by which the sampled loop multiplies a mode from tick to tick."""
+        """Largest growth factor of a mode per tick in the sampled loop."""
         return self._growth(self.rate, 1.0)
 
     @property
     def stable(self) -> bool:
-        """Whether no mode grows while the torque is held over ticks."""
+        """True if no mode grows while the torque is held over ticks."""
         return self.growth <= 1.0 + MARGINAL
 
     def warning(self) -> str:
-        """Why it diverges at its rate or is too fast for it, and what would do; or ""."""
+        """Return a warning if the loop diverges or is too fast for its rate; otherwise ""."""
         if not self.stable:
             return f"{self.name}: {self.divergence()}"
-        if self.ticks >= self.enough:
+        if self.ticks >= self.min_ticks:
             return ""
         return (
             f"{self.name}: {self.rate:g} Hz is low for a mode of {self.fastest:.3g} 1/s, "
-            f"{self.ticks:.2g} ticks in its time constant; {self.enough * self.fastest:.0f} Hz "
-            f"would do"
+            f"{self.ticks:.2g} ticks per time constant; {self.min_ticks * self.fastest:.0f} Hz "
+            f"is sufficient"
         )
 
     def divergence(self) -> str:
-        """What an unstable loop does, and the least that would cure it."""
+        """Return a description of an unstable loop, with the least changes that stabilise it."""
         found = (
-            f"held over a tick of {1e3 / self.rate:g} ms, the torque multiplies an error by "
-            f"{self.growth:.6g} per tick"
+            f"with the torque held over a tick of {1e3 / self.rate:g} ms, an error grows by a "
+            f"factor of {self.growth:.6g} per tick"
         )
-        cures = []
+        remedies = []
         if higher := _first(lambda factor: self._growth(self.rate * factor, 1.0)):
-            cures.append(f"from {self.rate * higher:.0f} Hz on")
+            remedies.append(f"at {self.rate * higher:.0f} Hz or more")
         if less := _first(lambda factor: self._growth(self.rate, 1.0 / factor)):
-            cures.append(f"with {_percent(1.0 / less)} of its damping")
+            remedies.append(f"with {_percent(1.0 / less)} of its damping")
         elif more := _first(lambda factor: self._growth(self.rate, factor)):
-            cures.append(f"with {more:.3g} times its damping")
-        return f"{found}; stable {' or '.join(cures)}" if cures else f"{found}; lower its gains"
+            remedies.append(f"with {more:.3g} times its damping")
+        return (
+            f"{found}; stable {' or '.join(remedies)}"
+            if remedies
+            else f"{found}; reduce its gains"
+        )
 
     def _feedback(self, damping: float) -> Array:
-        """Acceleration by error and its rate, shape (p, 2 p), with a multiple of the damping."""
+        """Return the acceleration per error and rate, shape (p, 2 p), with scaled damping."""
         return -np.linalg.solve(self.M, np.hstack([self.K, damping * self.D]))
 
     def _growth(self, rate: float, damping: float) -> float:
-        """Spectral radius of a tick in which the acceleration is held; infinite for no number."""
+        """Return the spectral radius of a tick with constant acceleration; inf if not finite."""
         T, feedback = 1.0 / rate, self._feedback(damping)
         eye, zero = np.eye(len(self.M)), np.zeros_like(self.M)
-        way = np.hstack([eye, T * eye]) + 0.5 * T * T * feedback
-        sampled = np.vstack([way, np.hstack([zero, eye]) + T * feedback])
+        position = np.hstack([eye, T * eye]) + 0.5 * T * T * feedback
+        sampled = np.vstack([position, np.hstack([zero, eye]) + T * feedback])
         if not np.isfinite(sampled).all():
             return np.inf
         return float(np.abs(np.linalg.eigvals(sampled)).max())
 
 
 def _first(growth: Callable[[float], float]) -> float | None:
-    """The smallest factor beyond 1 of those tried at which nothing grows, or None."""
+    """Return the smallest tried factor above 1 without growth, or None."""
     factors = (STEP**power for power in range(1, TRIALS + 1))
     return next((factor for factor in factors if growth(factor) <= 1.0 + MARGINAL), None)
 
 
 def _percent(share: float) -> str:
-    """In two digits that are never rounded up beyond the share."""
+    """Format a share with two digits, never rounded above the share."""
     return f"{95.0 * share:.2g} %"
 
 
 def closed_loops(
     law: str, dynamics: TaskDynamics, impedance: Impedance, names: tuple[str, ...], rate: float
 ) -> list[Loop]:
-    """The loops that a law can close around the state of `dynamics`, at a rate [Hz].
+    """Return the loops that a law can close around the state of `dynamics`, at a rate [Hz].
 
-    Those of `energy_gated` are the noninteracting ones while its gates are open, and the natural
-    one when sigma has come to zero: both must be stable.
+    The loops of `energy_gated` are the noninteracting ones while its gates are open, and the
+    natural one at sigma = 0: all must be stable.
     """
     damping, stiffness = np.diag(impedance.damping), np.diag(impedance.stiffness)
     if law == "natural":
@@ -160,6 +165,6 @@ def closed_loops(
         for name, inertia, part in zip(names, dynamics.inertias, dynamics.slices, strict=True)
     ]
     if law == GATED:
-        name, enough = "all subtasks at sigma = 0", TICKS_WITHOUT_DECOUPLING
-        loops.append(Loop(name, dynamics.inertia, damping, stiffness, rate, enough))
+        name, min_ticks = "all subtasks at sigma = 0", TICKS_WITHOUT_DECOUPLING
+        loops.append(Loop(name, dynamics.inertia, damping, stiffness, rate, min_ticks))
     return loops

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Functions of the robot-by-robot form that numba compiles; only controllers import them."""
+"""Compiled functions of the robot-by-robot form; only the controller imports them."""

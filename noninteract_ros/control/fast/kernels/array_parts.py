@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the compiled functions pass around: few arrays, whose parts have names only inside them.
+"""Arguments of the compiled functions: few arrays, with named parts inside the functions.
 
-A call from Python pays for each array that it hands over, and nothing for their parts.
+A call from Python has a cost per array that is passed, and none for its parts.
 """
 
 from typing import NamedTuple
@@ -17,10 +17,11 @@ MEAN, EDGES, JOINTS = range(3)
 
 
 class Plan(NamedTuple):
-    """Where the numbers of a structured team are; never changes.
+    """Index tables of a structured team; constant.
 
-    Robots have h coordinates of their tool and then chosen joints, m in all; who has fewer is
-    padded. Sorted coordinates of the subtasks are the mean's h, h of each edge, chosen joints.
+    Each robot has h tool coordinates followed by its chosen joints, m in all; robots with fewer
+    coordinates are padded. These m coordinates are called the robot's own. The sorted coordinates
+    of the subtasks are the h of the mean, h of each edge, and the chosen joints.
 
     Attributes:
         order: Indices of the sorted coordinates in a stacked vector, shape (n,).
@@ -28,12 +29,12 @@ class Plan(NamedTuple):
         chosen: Indices of the chosen joints among N m own coordinates, by subtask and robot,
             shape (P,).
         joints: Indices of the team's joints among N m padded ones, shape (n,).
-        steps: A walk over the tree of edges, from the first robot: edge, robot where it is
-            reached, the robot behind it, and 1 if that one is the edge's first, otherwise -1;
-            shape (N - 1, 4).
-        framed: Whether edges are seen from the frame of the mean.
-        parts: For each subtask its role, MEAN, EDGES or JOINTS, and which of the h coordinates,
-            or of the chosen joints, it has, from and up to; shape (subtasks, 3).
+        steps: Traversal of the tree of edges from the first robot; for each step the edge, the
+            robot reached before, the robot reached by it, and 1 if the latter is the edge's
+            first robot, otherwise -1; shape (N - 1, 4).
+        framed: True if edges are expressed in the frame of the mean.
+        parts: For each subtask its role, MEAN, EDGES or JOINTS, and the range of the h
+            coordinates, or of the chosen joints, that it has; shape (subtasks, 3).
     """
 
     order: Indices
@@ -49,11 +50,11 @@ class RobotArrays(NamedTuple):
     """Terms of the robots, shape (N, m, m) each.
 
     Attributes:
-        M: Inertia; ones on the diagonal of the padding.
+        M: Inertia matrix; ones on the diagonal of the padding.
         C: Coriolis matrix.
-        T: RobotArrays coordinates per joint velocity.
-        T_rate: Its time derivative.
-        T_inverse: Its inverse.
+        T: Own velocities per joint velocity.
+        T_rate: Time derivative of T.
+        T_inverse: Inverse of T.
         L: Inertia in own coordinates, T^-T M T^-1.
     """
 
@@ -66,7 +67,7 @@ class RobotArrays(NamedTuple):
 
 
 class MixingArrays(NamedTuple):
-    """How tools mix into mean c and edges r, shape (N, h, h) each; edges leave the last one free.
+    """Map of the tools' motions to mean c and edges r, shape (N, h, h) each; edges use N - 1.
 
     With the motion t_k of each tool and those t_a, t_b of an edge's robots,
 
@@ -74,11 +75,11 @@ class MixingArrays(NamedTuple):
 
     Attributes:
         G: Weights of the robots in the mean.
-        G_rate: Their time derivatives.
-        K: Turns differences into the frame that edges are seen from.
-        K_rate: Its time derivative.
-        H: What the motion of that frame adds; only where plan.framed.
-        H_rate: Its time derivative.
+        G_rate: Time derivative of G.
+        K: Rotation of differences into the frame of the edges.
+        K_rate: Time derivative of K.
+        H: Contribution of the motion of that frame; used only if plan.framed.
+        H_rate: Time derivative of H.
         B: Motion of each tool per motion of the mean: columns of A^-1.
     """
 
@@ -96,13 +97,13 @@ ROBOT_ARRAYS, MIXING_ARRAYS = len(RobotArrays._fields), len(MixingArrays._fields
 
 @inner
 def robot_arrays(blocks: Array) -> RobotArrays:
-    """Names the terms of the robots, shape (6, N, m, m)."""
+    """Return the terms of the robots, shape (6, N, m, m), by name."""
     return RobotArrays(blocks[0], blocks[1], blocks[2], blocks[3], blocks[4], blocks[5])
 
 
 @inner
 def mixing_arrays(mixers: Array) -> MixingArrays:
-    """Names the parts of the mixing, shape (7, N, h, h)."""
+    """Return the parts of the mixing, shape (7, N, h, h), by name."""
     return MixingArrays(
         mixers[0], mixers[1], mixers[2], mixers[3], mixers[4], mixers[5], mixers[6]
     )

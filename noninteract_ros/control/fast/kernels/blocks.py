@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Algebra of small matrices in stacks, shape (count, rows, columns), and which one of each stack.
+"""Algebra of small matrices in stacks of shape (count, rows, columns), selected by index.
 
-The factor on the left gives the size: of a taller factor or result only the first rows count.
+The left factor sets the size: of a taller factor or result, only the first rows are used.
 """
 
 import math
@@ -48,7 +48,7 @@ def transposed_product(A: Array, a: int, B: Array, b: int, out: Array, o: int) -
 
 @inner
 def clear(out: Array, o: int, rows: int) -> None:
-    """The first rows become zero."""
+    """Set the first rows to zero."""
     for i in range(rows):
         for j in range(out.shape[2]):
             out[o, i, j] = 0.0
@@ -56,7 +56,7 @@ def clear(out: Array, o: int, rows: int) -> None:
 
 @inner
 def add(scale: float, A: Array, a: int, out: Array, o: int, rows: int) -> None:
-    """The first rows: out += scale A."""
+    """Add to the first rows: out += scale A."""
     for i in range(rows):
         for j in range(out.shape[2]):
             out[o, i, j] += scale * A[a, i, j]
@@ -64,7 +64,7 @@ def add(scale: float, A: Array, a: int, out: Array, o: int, rows: int) -> None:
 
 @inner
 def cut(A: Array, a: int, first: int, out: Array, o: int) -> None:
-    """out = what A has on its diagonal from a row on, transposition apart."""
+    """Copy a diagonal block: out = A[first:, first:]."""
     for i in range(out.shape[1]):
         for j in range(out.shape[2]):
             out[o, i, j] = A[a, first + i, first + j]
@@ -74,7 +74,7 @@ def cut(A: Array, a: int, first: int, out: Array, o: int) -> None:
 def invert(A: Array, a: int, work: Array, out: Array, o: int) -> None:
     """out = A^-1 by elimination with pivots; `work`, a stack of one, is overwritten.
 
-    Of an exactly singular A it is that of a neighbour, with very large entries.
+    For an exactly singular A, the inverse of a nearby regular matrix, with very large entries.
     """
     size, shift = 0.0, 0.0
     for i in range(A.shape[1]):
@@ -87,7 +87,7 @@ def invert(A: Array, a: int, work: Array, out: Array, o: int) -> None:
 
 @inner
 def _eliminate(A: Array, a: int, shift: float, work: Array, out: Array, o: int) -> bool:
-    """The inverse of A + shift 1, and whether there is one."""
+    """Invert A + shift 1; return False if it is singular."""
     n = A.shape[1]
     for i in range(n):
         for j in range(n):
@@ -116,7 +116,7 @@ def _eliminate(A: Array, a: int, shift: float, work: Array, out: Array, o: int) 
 
 @inner
 def factorize(A: Array, a: int) -> None:
-    """Replaces the lower triangle of a positive-definite A by its Cholesky factor."""
+    """Replace the lower triangle of a positive-definite A by its Cholesky factor."""
     n = A.shape[1]
     for j in range(n):
         for k in range(j):
@@ -130,7 +130,7 @@ def factorize(A: Array, a: int) -> None:
 
 @inner
 def solve(F: Array, f: int, X: Array, x: int) -> None:
-    """Replaces the columns of X by A^-1 X; F is A after `factorize`."""
+    """Replace the columns of X by A^-1 X; F is A after `factorize`."""
     n = F.shape[1]
     for i in range(n):
         scale = 1.0 / F[f, i, i]

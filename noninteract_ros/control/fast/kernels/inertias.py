@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces divided by the inertia of each decoupled subtask, M_i = S_i' M S_i."""
+"""Division of forces by the inertia of each decoupled subtask, M_i = S_i' M S_i."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from noninteract_ros.control.fast.kernels.blocks import (
 
 @compiled
 def divide_by_inertias(plan: Plan, blocks: Array, mixers: Array, force: Array) -> Array:
-    """M_i^-1 f_i of each subtask, shape (n,)."""
+    """Return M_i^-1 f_i of each subtask, shape (n,)."""
     L, A = robot_arrays(blocks).L, mixing_arrays(mixers)
     result = np.empty(len(force))
     for part in range(len(plan.parts)):
@@ -43,7 +43,7 @@ def divide_by_inertias(plan: Plan, blocks: Array, mixers: Array, force: Array) -
 def _divide_mean(
     plan: Plan, L: Array, A: MixingArrays, lo: int, hi: int, force: Array, result: Array
 ) -> None:
-    """M_c^-1 f with M_c = B' L B, of the mean's coordinates lo to hi."""
+    """Write M_c^-1 f with M_c = B' L B, for the mean's coordinates lo to hi."""
     h, p = A.B.shape[1], hi - lo
     M, B, pushed = np.zeros((1, p, p)), np.empty((1, h, p)), np.empty((1, h, p))
     tools, x = np.empty((1, h, h)), np.empty((1, p, 1))
@@ -66,9 +66,9 @@ def _divide_mean(
 def _divide_edges(
     plan: Plan, L: Array, A: MixingArrays, lo: int, hi: int, force: Array, result: Array
 ) -> None:
-    """M_r^-1 f of the edges' coordinates lo to hi.
+    """Write M_r^-1 f for the edges' coordinates lo to hi.
 
-    y = A_r w of the stationary point, with the mean held by multipliers.
+    y = A_r w at the stationary point, with the mean held constant by multipliers.
     """
     N, h, p = len(L), A.G.shape[1], hi - lo
     G, K, F = np.empty((1, p, p)), np.empty((N, p, p)), np.empty((1, p, p))
@@ -111,7 +111,7 @@ def _divide_edges(
 def _divide_joints(
     plan: Plan, L: Array, A: MixingArrays, lo: int, hi: int, force: Array, result: Array
 ) -> None:
-    """M_p^-1 f of the chosen joints lo to hi: nothing else moves, so these are rows of L."""
+    """Write M_p^-1 f of the chosen joints lo to hi; only they move, so M_p is a block of L."""
     m, first = L.shape[1], len(L) * A.G.shape[1]
     while lo < hi:
         k, end = plan.chosen[lo] // m, lo + 1

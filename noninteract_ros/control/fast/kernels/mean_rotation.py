@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mean of the tools' orientations and its angular velocity, as `TeamRotation` has it."""
+"""Mean of the tools' orientations and its angular velocity, see `TeamRotation`."""
 
 import numpy as np
 
@@ -16,12 +16,12 @@ ITERATIONS = 20
 
 @inner
 def mean_rotation(weights: Array, orientations: Array, phis: Array) -> rotations.Quaternion:
-    """Mean of the tools' orientations by Newton's method.
+    """Return the mean of the tools' orientations, by Newton's method.
 
     Args:
-        weights: Weight of each, with sum 1, shape (N,).
-        orientations: Their orientations, shape (N, 3, 3).
-        phis: Rotation vectors from the mean to the tools, written, shape (N, 3).
+        weights: Weight of each tool, with sum 1, shape (N,).
+        orientations: Tool orientations, shape (N, 3, 3).
+        phis: Output: rotation vectors from the mean to the tools, shape (N, 3).
     """
     N = len(weights)
     tools = np.empty((N, 4))
@@ -53,9 +53,9 @@ def mean_rotation(weights: Array, orientations: Array, phis: Array) -> rotations
 
 @inner
 def _first_guess(weights: Array, tools: Array) -> rotations.Quaternion:
-    """Weighted sum of the quaternions, all with the sign that is nearer to the weightiest one.
+    """Return the weighted sum of the quaternions, with signs closest to the heaviest one.
 
-    Tools within a quarter turn of their mean are all within a half turn of each other.
+    Tools within a quarter turn of their mean are within a half turn of each other.
     """
     first = 0
     for k in range(len(weights)):
@@ -75,7 +75,7 @@ def _first_guess(weights: Array, tools: Array) -> rotations.Quaternion:
 def put_turning(
     A: MixingArrays, a: int, weights: Array, phis: Array, poses: Poses
 ) -> rotations.Vector:
-    """Writes G of the rotations and its rate; returns the mean's angular velocity.
+    """Write G of the rotations and its rate; return the mean's angular velocity.
 
     With A_k = A(phi_k)^-1 and B = sum of w_k A_k', G_k = w_k B^-1 A_k R_k.
     """

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The mixing A of the tools' motions into mean and edges, its rate, and the way back.
+"""The mixing A of the tools' motions into mean and edges, its rate and its inverse.
 
-The way back starts at the edges, which give every motion up to that of the first robot, and finds
-the latter by the mean. Everything works on s columns: c of the mean has shape (1, h, s), r of the
-edges (N - 1, h, s), and own vectors, shape (N, m, s), have the tools' coordinates first.
+The inverse starts at the edges, which determine every motion relative to the first robot, and
+finds the motion of the first robot from the mean. All functions work on s columns: c of the mean
+has shape (1, h, s), r of the edges (N - 1, h, s), and own vectors, shape (N, m, s), have the
+tools' coordinates first.
 """
 
 import numpy as np
@@ -23,7 +24,7 @@ from noninteract_ros.control.fast.kernels.blocks import (
 
 @inner
 def mix(steps: Indices, framed: bool, A: MixingArrays, own: Array, c: Array, r: Array) -> None:
-    """A t: writes mean and edges."""
+    """Write A t: mean and edges."""
     clear(c, FIRST, c.shape[1])
     for k in range(len(own)):
         add_product(1.0, A.G, k, own, k, c, FIRST)
@@ -42,7 +43,7 @@ def mix(steps: Indices, framed: bool, A: MixingArrays, own: Array, c: Array, r: 
 def add_mix_rate(
     scale: float, steps: Indices, framed: bool, A: MixingArrays, own: Array, c: Array, r: Array
 ) -> None:
-    """Adds scale (dA/dt) t to mean and edges."""
+    """Add scale (dA/dt) t to mean and edges."""
     h = c.shape[1]
     turning, mean = np.zeros(c.shape), np.zeros(c.shape)
     for k in range(len(own)):
@@ -63,7 +64,7 @@ def add_mix_rate(
 def unmix(
     steps: Indices, framed: bool, A: MixingArrays, G_inverse: Array, c: Array, r: Array, own: Array
 ) -> None:
-    """A^-1: writes the tools' coordinates of own motions; uses up c and, where framed, r."""
+    """Write A^-1 (c, r): tool coordinates of own motions; overwrites c and, if framed, r."""
     h = c.shape[1]
     shift = np.empty(c.shape)
     clear(own, FIRST, h)
@@ -85,7 +86,7 @@ def unmix(
 def mix_transposed(
     steps: Indices, framed: bool, A: MixingArrays, c: Array, r: Array, own: Array
 ) -> None:
-    """A' f: writes forces on the tools of forces on mean and edges; uses up c where framed."""
+    """Write A' f: tool forces of forces on mean and edges; overwrites c if framed."""
     if framed:
         for edge in range(len(r)):
             add_transposed_product(1.0, A.H, edge, r, edge, c, FIRST)
@@ -101,7 +102,7 @@ def mix_transposed(
 def unmix_transposed(
     steps: Indices, framed: bool, A: MixingArrays, G_inverse: Array, own: Array, c: Array, r: Array
 ) -> None:
-    """A^-T f: writes forces on mean and edges of forces on the tools, which are used up."""
+    """Write A^-T f: forces on mean and edges of tool forces, which are overwritten."""
     h = c.shape[1]
     total = np.zeros(c.shape)
     for k in range(len(own)):
@@ -121,7 +122,7 @@ def unmix_transposed(
 
 @inner
 def inverse_squares(steps: Indices, A: MixingArrays, G_inverse: Array) -> Array:
-    """Blocks on the diagonal of A^-1 A^-T, shape (N, h, h).
+    """Return the diagonal blocks of A^-1 A^-T, shape (N, h, h).
 
     The column of A^-1 for edge e is 1 beyond the edge minus Q_e, times K_e', where Q_e is the sum
     of the G_k beyond it divided by the sum of all.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Differences of values and motions, as `subtasks.layout` has them for any number of values."""
+"""Differences of single values and motions; see `subtasks.layout` for any number of them."""
 
 import math
 from typing import NamedTuple
@@ -13,45 +13,45 @@ from noninteract_ros.control.fast.kernels.array_parts import Indices
 
 
 class Numbers(NamedTuple):
-    """Where the numbers of a layout are.
+    """Index tables of a layout.
 
     Attributes:
-        values: Indices of the plain numbers in a value, shape (k,).
-        rates: Indices of their rates in a velocity, shape (k,).
-        wound: Indices of the rates of angles, shape (w,).
-        quaternions: Indices where quaternions begin in a value, shape (r,).
-        angular: Indices where their angular velocities begin in a velocity, shape (r,).
+        values: Indices of the scalars in a value, shape (k,).
+        rates: Indices of the scalars' rates in a velocity, shape (k,).
+        angles: Indices of the rates of angles, shape (w,).
+        quaternions: First index of each quaternion in a value, shape (r,).
+        angular: First index of each angular velocity in a velocity, shape (r,).
     """
 
     values: Indices
     rates: Indices
-    wound: Indices
+    angles: Indices
     quaternions: Indices
     angular: Indices
 
 
 @inner
 def quaternion_of(x: Array, first: int) -> rotations.Quaternion:
-    """Four numbers of a vector."""
+    """Return four numbers of a vector."""
     return x[first], x[first + 1], x[first + 2], x[first + 3]
 
 
 @inner
 def vector_of(x: Array, first: int) -> rotations.Vector:
-    """Three numbers of a vector."""
+    """Return three numbers of a vector."""
     return x[first], x[first + 1], x[first + 2]
 
 
 @inner
 def shorten(numbers: Numbers, e: Array) -> None:
-    """Differences of angles the shorter way round."""
-    for place in numbers.wound:
+    """Wrap differences of angles to [-pi, pi]."""
+    for place in numbers.angles:
         e[place] -= 2.0 * math.pi * np.rint(e[place] / (2.0 * math.pi))
 
 
 @compiled
 def difference(numbers: Numbers, x: Array, x_d: Array) -> Array:
-    """x - x_d; for rotations log(R R_d'), for angles within [-pi, pi]; shape (dim,)."""
+    """Return x - x_d: log(R R_d') for rotations, wrapped for angles; shape (dim,)."""
     e = np.empty(len(numbers.values) + 3 * len(numbers.quaternions))
     for i in range(len(numbers.values)):
         e[numbers.rates[i]] = x[numbers.values[i]] - x_d[numbers.values[i]]
@@ -75,16 +75,16 @@ def deviation(
     growth: Array,
     dt: float,
 ) -> tuple[Array, Array]:
-    """Difference and its rate between a motion and where another one led `dt` s later.
+    """Return the difference, and its rate, of a motion from an extrapolated earlier one.
 
     Args:
-        numbers: Where the numbers are.
+        numbers: Index tables of the layout.
         x: Value of the motion, shape (size,).
-        velocity: Its velocity, shape (dim,).
-        before: Value of the other motion.
-        rate: Its velocity.
-        growth: Its acceleration.
-        dt: Time between them [s].
+        velocity: Velocity of the motion, shape (dim,).
+        before: Value of the earlier motion, shape (size,).
+        rate: Velocity of the earlier motion, shape (dim,).
+        growth: Acceleration of the earlier motion, shape (dim,).
+        dt: Time between both [s].
     """
     e, e_rate = np.empty(len(velocity)), np.empty(len(velocity))
     half = 0.5 * dt * dt

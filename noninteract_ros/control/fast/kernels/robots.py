@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From what Pinocchio has found of each robot to the terms of the law."""
+"""Terms of the law from Pinocchio's results for each robot."""
 
 from typing import NamedTuple
 
@@ -12,13 +12,13 @@ from noninteract_ros.control.fast.kernels.blocks import invert, product, transpo
 
 
 class Tools(NamedTuple):
-    """What the tools have at all states.
+    """Constants of the tools.
 
     Attributes:
         rows: Axes in use, out of 0, 1 and 2, shape (a,).
-        rotates: Whether the tools' rotations count.
-        translations: From the last joint's frame to the tool, shape (N, 3) [m].
-        rotations: The same with the constant offsets of orientations, shape (N, 3, 3).
+        rotates: True if the tools' rotations are used.
+        translations: Position of the tool in the last joint's frame, shape (N, 3) [m].
+        rotations: Orientation of the tool, with its constant offset, shape (N, 3, 3).
         moves: 1 for each joint that moves its robot's tool, shape (N, m).
         chosen: T of the chosen joints and of the padding, zero elsewhere, shape (N, m, m).
     """
@@ -32,14 +32,14 @@ class Tools(NamedTuple):
 
 
 class Poses(NamedTuple):
-    """Where the tools are; overwritten from tick to tick.
+    """Poses and Jacobians of the tools; overwritten at every tick.
 
     Attributes:
         jacobians: Twists per joint velocity in world axes, shape (N, 6, m).
-        rates: Their time derivatives.
-        positions: Shape (N, 3).
-        rotations: Orientations, shape (N, 3, 3).
-        twists: Shape (N, 6).
+        rates: Time derivatives of the Jacobians, shape (N, 6, m).
+        positions: Tool points, shape (N, 3) [m].
+        rotations: Tool orientations, shape (N, 3, 3).
+        twists: Tool twists, shape (N, 6).
     """
 
     jacobians: Array
@@ -61,18 +61,18 @@ def gather(
     translation: Array,
     rotation: Array,
 ) -> None:
-    """Copies what Pinocchio has of robot k; it fills the upper triangle of M only.
+    """Copy Pinocchio's results of robot k; Pinocchio fills the upper triangle of M only.
 
     Args:
-        k: The robot.
-        blocks: Terms of all robots, shape (6, N, m, m), from M and C on.
-        poses: Frames of all last joints, with twists at the world's origin.
-        M: Inertia, shape (n_k, n_k).
-        C: Coriolis matrix.
+        k: Index of the robot.
+        blocks: Output: terms of all robots, shape (6, N, m, m), of which M and C are written.
+        poses: Output: frames of the last joints, with twists at the world's origin.
+        M: Inertia matrix, shape (n_k, n_k).
+        C: Coriolis matrix, shape (n_k, n_k).
         J: Twists of the joints at the world's origin, shape (6, n_k).
-        J_rate: Their time derivatives.
-        translation: Where the frame of the last joint is, shape (3,).
-        rotation: How it is turned, shape (3, 3).
+        J_rate: Time derivative of J, shape (6, n_k).
+        translation: Position of the last joint's frame, shape (3,).
+        rotation: Orientation of the last joint's frame, shape (3, 3).
     """
     size = len(M)
     for i in range(size):
@@ -91,13 +91,13 @@ def gather(
 
 @compiled
 def robot_terms(plan: Plan, tools: Tools, poses: Poses, blocks: Array, v: Array) -> None:
-    """Fills the terms of all robots, and moves what `gather` has found to the tools.
+    """Compute the terms of all robots, and move the results of `gather` to the tools.
 
     Args:
-        plan: Where the numbers are.
+        plan: Index tables.
         tools: Constants of the tools.
-        poses: Those of the last joints, with twists at the world's origin.
-        blocks: Terms, shape (6, N, m, m); M and C are there already.
+        poses: Frames of the last joints on input, of the tools on output.
+        blocks: Terms, shape (6, N, m, m); M and C are input, the others output.
         v: Velocity, shape (n,).
     """
     terms = robot_arrays(blocks)
@@ -116,7 +116,7 @@ def robot_terms(plan: Plan, tools: Tools, poses: Poses, blocks: Array, v: Array)
 
 @inner
 def _move_frame(tools: Tools, poses: Poses, k: int) -> None:
-    """From the frame of the last joint to the tool's."""
+    """Move the frame of the last joint to the tool."""
     R, t = poses.rotations, tools.translations
     for i in range(3):
         x, y, z = R[k, i, 0], R[k, i, 1], R[k, i, 2]
@@ -128,7 +128,7 @@ def _move_frame(tools: Tools, poses: Poses, k: int) -> None:
 
 @inner
 def _move_twists(tools: Tools, poses: Poses, k: int, v: Array) -> None:
-    """From the world's origin to the tool point p: J + omega x p, and the rate of that."""
+    """Move twists from the world's origin to the tool point p: J + omega x p, and its rate."""
     J, J_rate, p, twist = poses.jacobians, poses.rates, poses.positions, poses.twists
     for row in range(5, -1, -1):
         a, b = (row + 1) % 3, (row + 2) % 3
@@ -148,7 +148,7 @@ def _move_twists(tools: Tools, poses: Poses, k: int, v: Array) -> None:
 
 @inner
 def _put_own(tools: Tools, poses: Poses, k: int, T: Array, T_rate: Array) -> None:
-    """T and its rate: along the axes in use, R' omega of the tool, chosen joints."""
+    """Write T and its rate: velocity along the axes in use, R' omega, chosen joints."""
     J, J_rate, R, twist = poses.jacobians, poses.rates, poses.rotations, poses.twists
     a, m = len(tools.rows), T.shape[1]
     for i in range(m):

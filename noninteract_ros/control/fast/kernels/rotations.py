@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Single rotations: what `subtasks.so3` has for many, in closed form for one.
+"""Single rotations in closed form; see `subtasks.so3` for any number of them.
 
 Quaternions (x, y, z, w) and vectors are tuples, matrices are arrays.
 """
@@ -17,13 +17,13 @@ Quaternion = tuple[float, float, float, float]
 Vector = tuple[float, float, float]
 
 _A, _B = so3.ANGLE_A.series, so3.ANGLE_B.series
-ANGULAR = cast(int, np.intp(3))  # Where the angular part of a twist begins.
+ANGULAR = cast(int, np.intp(3))  # First index of the angular part of a twist.
 _C, _C_SLOPE = so3.ANGLE_C.series, so3.ANGLE_C.slope_series
 
 
 @inner
 def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """The rotation q followed by p."""
+    """Return the quaternion of the rotation q followed by p."""
     x, y, z, w = p
     a, b, c, d = q
     return (
@@ -36,26 +36,26 @@ def product(p: Quaternion, q: Quaternion) -> Quaternion:
 
 @inner
 def inverse(q: Quaternion) -> Quaternion:
-    """The opposite rotation."""
+    """Return the inverse of a unit quaternion."""
     return -q[0], -q[1], -q[2], q[3]
 
 
 @inner
 def normalized(q: Quaternion) -> Quaternion:
-    """The quaternion at unit length."""
+    """Return the quaternion at unit length."""
     scale = 1.0 / math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return scale * q[0], scale * q[1], scale * q[2], scale * q[3]
 
 
 @inner
 def positive(q: Quaternion) -> Quaternion:
-    """The same rotation with w >= 0."""
+    """Return the same rotation with w >= 0."""
     return q if q[3] >= 0.0 else (-q[0], -q[1], -q[2], -q[3])
 
 
 @inner
 def exp(phi: Vector) -> Quaternion:
-    """Unit quaternion of a rotation vector [rad]."""
+    """Return the unit quaternion of a rotation vector [rad]."""
     angle = math.sqrt(phi[0] * phi[0] + phi[1] * phi[1] + phi[2] * phi[2])
     half = 0.5 * angle
     scale = 0.5 if half == 0.0 else 0.5 * math.sin(half) / half
@@ -64,7 +64,7 @@ def exp(phi: Vector) -> Quaternion:
 
 @inner
 def log(q: Quaternion) -> Vector:
-    """Shortest rotation vector of a quaternion of either sign [rad]."""
+    """Return the shortest rotation vector of a quaternion of either sign [rad]."""
     size = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
     scale = 2.0 if size == 0.0 else 2.0 * math.atan2(size, abs(q[3])) / size
     if q[3] < 0.0:
@@ -74,7 +74,7 @@ def log(q: Quaternion) -> Vector:
 
 @inner
 def put_matrix(q: Quaternion, R: Array, r: int) -> None:
-    """Writes the rotation matrix of a unit quaternion."""
+    """Write the rotation matrix of a unit quaternion."""
     x, y, z, w = q
     for i in range(3):
         R[r, i, i] = 1.0
@@ -88,7 +88,7 @@ def put_matrix(q: Quaternion, R: Array, r: int) -> None:
 
 @inner
 def of_matrix(R: Array, r: int) -> Quaternion:
-    """Unit quaternion of a rotation matrix with w >= 0, from its largest component."""
+    """Return the unit quaternion of a rotation matrix, w >= 0, from its largest component."""
     a, b, c = R[r, 0, 0], R[r, 1, 1], R[r, 2, 2]
     x, y, z = R[r, 2, 1] - R[r, 1, 2], R[r, 0, 2] - R[r, 2, 0], R[r, 1, 0] - R[r, 0, 1]
     xy, xz, yz = R[r, 1, 0] + R[r, 0, 1], R[r, 0, 2] + R[r, 2, 0], R[r, 2, 1] + R[r, 1, 2]
@@ -118,7 +118,7 @@ def _dot(a: Vector, b: Vector) -> float:
 
 @inner
 def _put(phi: Vector, linear: float, squared: float, out: Array, o: int) -> None:
-    """out = 1 + linear [phi] + squared [phi]^2, with [phi]^2 = phi phi' - |phi|^2."""
+    """Write 1 + linear [phi] + squared [phi]^2, with [phi]^2 = phi phi' - |phi|^2."""
     x, y, z = phi
     own = 1.0 - squared * _dot(phi, phi)
     out[o, 0, 0], out[o, 1, 1] = own + squared * x * x, own + squared * y * y
@@ -130,7 +130,7 @@ def _put(phi: Vector, linear: float, squared: float, out: Array, o: int) -> None
 
 @inner
 def put_jacobian(phi: Vector, out: Array, o: int) -> None:
-    """Writes A(phi): angular velocity of exp(phi) per rate of phi."""
+    """Write A(phi): angular velocity of exp(phi) per rate of phi."""
     square = _dot(phi, phi)
     if square < 1.0:
         a, b = _series(_A, square), _series(_B, square)
@@ -142,7 +142,7 @@ def put_jacobian(phi: Vector, out: Array, o: int) -> None:
 
 @inner
 def put_inverse_jacobian(phi: Vector, out: Array, o: int) -> None:
-    """Writes A(phi)^-1."""
+    """Write A(phi)^-1."""
     square = _dot(phi, phi)
     if square < 1.0:
         c = _series(_C, square)
@@ -154,7 +154,7 @@ def put_inverse_jacobian(phi: Vector, out: Array, o: int) -> None:
 
 @inner
 def put_inverse_jacobian_rate(phi: Vector, phi_rate: Vector, out: Array, o: int) -> None:
-    """Writes d(A^-1)/dt along a motion of phi."""
+    """Write d(A^-1)/dt along a motion of phi."""
     square, along = _dot(phi, phi), _dot(phi, phi_rate)
     if square < 1.0:
         c, slope = _series(_C, square), along * _series(_C_SLOPE, square)
@@ -173,7 +173,7 @@ def put_inverse_jacobian_rate(phi: Vector, phi_rate: Vector, out: Array, o: int)
 
 @inner
 def times(A: Array, a: int, u: Vector) -> Vector:
-    """A u."""
+    """Return A u."""
     return (
         A[a, 0, 0] * u[0] + A[a, 0, 1] * u[1] + A[a, 0, 2] * u[2],
         A[a, 1, 0] * u[0] + A[a, 1, 1] * u[1] + A[a, 1, 2] * u[2],
@@ -183,7 +183,7 @@ def times(A: Array, a: int, u: Vector) -> Vector:
 
 @inner
 def transposed_times(A: Array, a: int, u: Vector) -> Vector:
-    """A' u."""
+    """Return A' u."""
     return (
         A[a, 0, 0] * u[0] + A[a, 1, 0] * u[1] + A[a, 2, 0] * u[2],
         A[a, 0, 1] * u[0] + A[a, 1, 1] * u[1] + A[a, 2, 1] * u[2],
@@ -193,36 +193,36 @@ def transposed_times(A: Array, a: int, u: Vector) -> Vector:
 
 @inner
 def cross(a: Vector, b: Vector) -> Vector:
-    """a x b."""
+    """Return a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @inner
 def combined(scale: float, a: Vector, b: Vector) -> Vector:
-    """scale a + b."""
+    """Return scale a + b."""
     return scale * a[0] + b[0], scale * a[1] + b[1], scale * a[2] + b[2]
 
 
 @inner
 def vector_at(A: Array, row: int, first: int) -> Vector:
-    """Three numbers of a row."""
+    """Return three numbers of a row."""
     return A[row, first], A[row, first + 1], A[row, first + 2]
 
 
 @inner
 def row_at(A: Array, a: int, row: int) -> Vector:
-    """A row of a matrix."""
+    """Return a row of a matrix."""
     return A[a, row, 0], A[a, row, 1], A[a, row, 2]
 
 
 @inner
 def quaternion_at(A: Array, row: int, first: int) -> Quaternion:
-    """Four numbers of a row."""
+    """Return four numbers of a row."""
     return A[row, first], A[row, first + 1], A[row, first + 2], A[row, first + 3]
 
 
 @inner
 def put_quaternion(q: Quaternion, A: Array, row: int, first: int) -> None:
-    """Writes four numbers of a row."""
+    """Write a quaternion into a row."""
     for i in range(4):
         A[row, first + i] = q[i]

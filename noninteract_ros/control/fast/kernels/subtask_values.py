@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Values of the subtasks, and the mixing of the tools' motions, at a state."""
+"""Values of the subtasks, and the mixing of the tools' motions."""
 
 from typing import NamedTuple
 
@@ -21,13 +21,13 @@ from noninteract_ros.control.fast.kernels.robots import Poses, Tools
 
 
 class Means(NamedTuple):
-    """What mean and edges are at all states.
+    """Constants of mean and edges.
 
     Attributes:
         weights: Weight of each robot in the mean, shape (N,).
-        order: Indices of the values of mean and edges among all, sorted as `Plan` has it.
-        framed_points: Whether the edges' positions are seen from the mean's frame.
-        framed_rotations: Whether their rotations are.
+        order: Indices of the values of mean and edges, sorted as in `Plan`.
+        framed_points: True if the edges' positions are expressed in the frame of the mean.
+        framed_rotations: True if the edges' rotations are expressed in the frame of the mean.
     """
 
     weights: Array
@@ -37,7 +37,13 @@ class Means(NamedTuple):
 
 
 class MeanFrame(NamedTuple):
-    """The frame of the mean: quaternion, matrix, shape (1, 3, 3), and angular velocity."""
+    """Frame of the mean.
+
+    Attributes:
+        q: Quaternion.
+        R: Rotation matrix, shape (1, 3, 3).
+        omega: Angular velocity.
+    """
 
     q: rotations.Quaternion
     R: Array
@@ -54,16 +60,16 @@ def mixing_terms(
     G_inverse: Array,
     x: Array,
 ) -> None:
-    """Fills the mixing, and the values of all subtasks but for the joints.
+    """Compute the mixing, and the values of all subtasks except joints.
 
     Args:
-        plan: Where the numbers are.
+        plan: Index tables.
         tools: Constants of the tools.
         means: Constants of mean and edges.
-        poses: Those of the tools.
-        mixers: The mixing, zeros, shape (7, N, h, h).
-        G_inverse: Inverse of the sum of all G_k, shape (1, h, h).
-        x: Values of all subtasks, shape (size,).
+        poses: Poses of the tools.
+        mixers: Output: mixing, zeros on input, shape (7, N, h, h).
+        G_inverse: Output: inverse of the sum of all G_k, shape (1, h, h).
+        x: Output: values of all subtasks, shape (size,).
     """
     A, a, N = mixing_arrays(mixers), len(tools.rows), len(poses.positions)
     values, phis = np.zeros((N, a + 4)), np.empty((N, 3))
@@ -91,7 +97,7 @@ def mixing_terms(
 
 @inner
 def _put_inverse(plan: Plan, A: MixingArrays, G_inverse: Array) -> None:
-    """The inverse of the sum of G, and B."""
+    """Write the inverse of the sum of G, and B."""
     h = G_inverse.shape[1]
     total, work, one = np.zeros((1, h, h)), np.empty((1, h, h)), np.zeros((1, h, h))
     for i in range(h):
@@ -106,7 +112,7 @@ def _put_inverse(plan: Plan, A: MixingArrays, G_inverse: Array) -> None:
 
 @inner
 def _axis(frame: MeanFrame, framed: bool, i: int) -> tuple[rotations.Vector, rotations.Vector]:
-    """Axis i that an edge is seen along, the frame's or the world's, and its time derivative."""
+    """Return axis i of the reference frame, the mean's or the world's, and its time derivative."""
     if framed:
         axis = frame.R[0, 0, i], frame.R[0, 1, i], frame.R[0, 2, i]
         return axis, rotations.cross(frame.omega, axis)
@@ -123,7 +129,7 @@ def _put_points(
     d: rotations.Vector,
     d_rate: rotations.Vector,
 ) -> None:
-    """K and H of a gap d that the frame sees: R_c' d moves with R_c' (d' + d x omega_c)."""
+    """Write K and H of a difference d in the frame: R_c' d, with rate R_c' (d' + d x omega_c)."""
     for i in range(3):
         axis, axis_rate = _axis(frame, framed, i)
         arm, arm_rate = rotations.cross(axis, d), rotations.cross(axis, d_rate)
@@ -143,9 +149,10 @@ def _put_rotations(
     first: int,
     second: int,
 ) -> None:
-    """K and H of E = R_a R_b', which turns with R_a (omega_a - omega_b) in axes of the tools.
+    """Write K and H of E = R_a R_b', with rate R_a (omega_a - omega_b) in axes of the tools.
 
-    The frame sees R_c' (omega_E - (1 - E) omega_c), omega_E = omega_a - E omega_b in world axes.
+    In the frame, the rate is R_c' (omega_E - (1 - E) omega_c), omega_E = omega_a - E omega_b in
+    world axes.
     """
     R, a = poses.rotations, A.K.shape[1] - 3
     omega = rotations.vector_at(poses.twists, first, rotations.ANGULAR)
@@ -181,7 +188,7 @@ def _put_edge(
     second: int,
     values: Array,
 ) -> None:
-    """Values of an edge, and its K and H with their rates."""
+    """Write the values of an edge, and its K and H with their rates."""
     a = len(tools.rows)
     p, q = rotations.vector_at(poses.positions, first, FIRST), poses.positions
     d = rotations.combined(-1.0, rotations.vector_at(q, second, FIRST), p)
@@ -192,9 +199,9 @@ def _put_edge(
         values[1 + edge, i] = d[tools.rows[i]]
     if means.framed_points:
         _put_points(frame, means.framed_points, A, edge, d, d_rate)
-        seen = rotations.transposed_times(frame.R, FIRST, d)
+        in_frame = rotations.transposed_times(frame.R, FIRST, d)
         for i in range(3):
-            values[1 + edge, i] = seen[i]
+            values[1 + edge, i] = in_frame[i]
     if tools.rotates:
         framed = means.framed_rotations
         _put_rotations(poses, frame, framed, A, edge, first, second)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The operations of `control.structured.RobotwiseDynamics`, each one call.
+"""Operations of `control.fast.robotwise_dynamics.RobotwiseDynamics`, one call each.
 
-J = A T, and no matrix over the whole team is formed: see there. G_inverse is the inverse of the
-sum of all G_k of the mixing, shape (1, h, h).
+J = A T, and no matrix over the whole team is formed, as described there. G_inverse is the inverse
+of the sum of all G_k of the mixing, shape (1, h, h).
 """
 
 import numpy as np
@@ -47,14 +47,14 @@ from noninteract_ros.control.fast.kernels.vectors import (
 
 @compiled
 def velocity(plan: Plan, blocks: Array, mixers: Array, v: Array) -> Array:
-    """J v, shape (n,)."""
+    """Return J v, shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return first_column(mixed(plan, A, times(terms.T, own_joints(plan, terms, v))))
 
 
 @compiled
 def acceleration_of(plan: Plan, blocks: Array, mixers: Array, v: Array, a: Array) -> Array:
-    """J a + (dJ/dt) v, shape (n,), with (dJ/dt) v = (dA/dt) T v + A (dT/dt) v."""
+    """Return J a + (dJ/dt) v, shape (n,), with (dJ/dt) v = (dA/dt) T v + A (dT/dt) v."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     h = A.G.shape[1]
     v_own = own_joints(plan, terms, v)
@@ -71,7 +71,7 @@ def acceleration_of(plan: Plan, blocks: Array, mixers: Array, v: Array, a: Array
 def joint_acceleration(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, v: Array, wanted: Array
 ) -> Array:
-    """S (a - (dJ/dt) v), shape (n,)."""
+    """Return S (a - (dJ/dt) v), shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     h = A.G.shape[1]
     v_own = own_joints(plan, terms, v)
@@ -90,7 +90,7 @@ def joint_acceleration(
 def coriolis(
     plan: Plan, terms: RobotArrays, A: MixingArrays, G_inverse: Array, e_rates: Array
 ) -> Array:
-    """mu e_rates with mu = S' (C S + M dS/dt), dS/dt = -S (dJ/dt) S, shape (n, s)."""
+    """Return mu e_rates with mu = S' (C S + M dS/dt), dS/dt = -S (dJ/dt) S, shape (n, s)."""
     N, m = terms.M.shape[0], terms.M.shape[1]
     h, s = A.G.shape[1], e_rates.shape[1]
     c, r = np.empty((1, h, s)), np.empty((N - 1, h, s))
@@ -116,7 +116,7 @@ def coriolis(
 def coriolis_force(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, e_rate: Array
 ) -> Array:
-    """C~_i e_rate_i of each subtask, shape (n,)."""
+    """Return C~_i e_rate_i of each subtask, shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return picked(plan, coriolis(plan, terms, A, G_inverse, spread(plan, e_rate)))
 
@@ -125,14 +125,14 @@ def coriolis_force(
 def natural_coriolis_force(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, e_rate: Array
 ) -> Array:
-    """mu e_rate, shape (n,)."""
+    """Return mu e_rate, shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return first_column(coriolis(plan, terms, A, G_inverse, column(e_rate)))
 
 
 @compiled
 def torque(plan: Plan, blocks: Array, g: Array, v: Array, a: Array) -> Array:
-    """M a + C v + g, shape (n,)."""
+    """Return M a + C v + g, shape (n,)."""
     terms = robot_arrays(blocks)
     v_own = own_joints(plan, terms, v)
     force = times(terms.M, own_joints(plan, terms, a))
@@ -146,7 +146,7 @@ def torque(plan: Plan, blocks: Array, g: Array, v: Array, a: Array) -> Array:
 
 @compiled
 def acceleration_under(plan: Plan, blocks: Array, mixers: Array, torque: Array) -> Array:
-    """J M^-1 tau, shape (n,)."""
+    """Return J M^-1 tau, shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     own, M = own_joints(plan, terms, torque), terms.M.copy()
     for k in range(len(own)):
@@ -159,7 +159,7 @@ def acceleration_under(plan: Plan, blocks: Array, mixers: Array, torque: Array) 
 def multiplied(
     plan: Plan, terms: RobotArrays, A: MixingArrays, G_inverse: Array, columns: Array
 ) -> Array:
-    """Lambda a = A^-T L A^-1 a of columns, shape (n, s)."""
+    """Return Lambda a = A^-T L A^-1 a of columns, shape (n, s)."""
     N, h, s = len(terms.M), A.G.shape[1], columns.shape[1]
     c, r, own = np.empty((1, h, s)), np.empty((N - 1, h, s)), np.empty((N, terms.M.shape[1], s))
     split(plan, columns, c, r, own)
@@ -173,7 +173,7 @@ def multiplied(
 def multiply_by_inertias(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, a: Array
 ) -> Array:
-    """S_i' M S_i a_i of each subtask, shape (n,)."""
+    """Return S_i' M S_i a_i of each subtask, shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return picked(plan, multiplied(plan, terms, A, G_inverse, spread(plan, a)))
 
@@ -182,14 +182,14 @@ def multiply_by_inertias(
 def multiply_by_inertia(
     plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, a: Array
 ) -> Array:
-    """Lambda a, shape (n,)."""
+    """Return Lambda a, shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     return first_column(multiplied(plan, terms, A, G_inverse, column(a)))
 
 
 @compiled
 def force_of(plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, torque: Array) -> Array:
-    """S' tau = A^-T T^-T tau, shape (n,)."""
+    """Return S' tau = A^-T T^-T tau, shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     h, joints = A.G.shape[1], own_joints(plan, terms, torque)
     force = np.empty(joints.shape)
@@ -202,7 +202,7 @@ def force_of(plan: Plan, blocks: Array, mixers: Array, G_inverse: Array, torque:
 
 @compiled
 def divide_by_inertia(plan: Plan, blocks: Array, mixers: Array, force: Array) -> Array:
-    """Lambda^-1 f = A L^-1 A' f, shape (n,)."""
+    """Return Lambda^-1 f = A L^-1 A' f, shape (n,)."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     N, h = len(terms.M), A.G.shape[1]
     c, r, own = np.empty((1, h, 1)), np.empty((N - 1, h, 1)), np.empty((N, terms.M.shape[1], 1))
@@ -217,7 +217,7 @@ def divide_by_inertia(plan: Plan, blocks: Array, mixers: Array, force: Array) ->
 
 @compiled
 def inverse_norm(plan: Plan, blocks: Array, mixers: Array, G_inverse: Array) -> float:
-    """Frobenius norm of S, not finite where T is singular."""
+    """Return the Frobenius norm of S, not finite for singular T."""
     terms, A = robot_arrays(blocks), mixing_arrays(mixers)
     squares = inverse_squares(plan.steps, A, G_inverse)
     m, h, total = terms.M.shape[1], A.G.shape[1], 0.0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vectors over the joints and over the subtasks, taken apart and put together."""
+"""Conversion of vectors between stacked, joint and own coordinates."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from noninteract_ros.control.fast.kernels.mixing import mix
 
 @inner
 def own_joints(plan: Plan, terms: RobotArrays, v: Array) -> Array:
-    """A vector over the joints, shape (n,), robot by robot, shape (N, m, 1)."""
+    """Convert a vector over the joints, shape (n,), to one by robot, shape (N, m, 1)."""
     m = terms.M.shape[1]
     own = np.zeros((len(terms.M), m, 1))
     for i in range(len(v)):
@@ -22,7 +22,7 @@ def own_joints(plan: Plan, terms: RobotArrays, v: Array) -> Array:
 
 @inner
 def team_joints(plan: Plan, own: Array) -> Array:
-    """The opposite of `own_joints`."""
+    """Convert a vector by robot to one over the joints; inverse of `own_joints`."""
     m, v = own.shape[1], np.empty(len(plan.joints))
     for i in range(len(v)):
         v[i] = own[plan.joints[i] // m, plan.joints[i] % m, 0]
@@ -31,7 +31,7 @@ def team_joints(plan: Plan, own: Array) -> Array:
 
 @inner
 def split(plan: Plan, stacked: Array, c: Array, r: Array, own: Array) -> None:
-    """Takes stacked columns, shape (n, s), apart: mean, edges, and chosen joints in own ones."""
+    """Split stacked columns, shape (n, s), into mean, edges, and chosen joints of own vectors."""
     h, m, s = c.shape[1], own.shape[1], own.shape[2]
     first = h * len(own)
     for j in range(s):
@@ -48,7 +48,7 @@ def split(plan: Plan, stacked: Array, c: Array, r: Array, own: Array) -> None:
 
 @inner
 def joined(plan: Plan, c: Array, r: Array, own: Array) -> Array:
-    """The opposite of `split`, shape (n, s)."""
+    """Join mean, edges and chosen joints to stacked columns, shape (n, s); inverse of `split`."""
     h, m, s = c.shape[1], own.shape[1], own.shape[2]
     first, stacked = h * len(own), np.empty((len(plan.order), s))
     for j in range(s):
@@ -63,7 +63,7 @@ def joined(plan: Plan, c: Array, r: Array, own: Array) -> Array:
 
 @inner
 def column(vector: Array) -> Array:
-    """A vector as one column, shape (n, 1)."""
+    """Convert a vector to one column, shape (n, 1)."""
     result = np.empty((len(vector), 1))
     for i in range(len(vector)):
         result[i, 0] = vector[i]
@@ -72,7 +72,7 @@ def column(vector: Array) -> Array:
 
 @inner
 def first_column(columns: Array) -> Array:
-    """The opposite of `column`."""
+    """Convert one column to a vector; inverse of `column`."""
     result = np.empty(len(columns))
     for i in range(len(columns)):
         result[i] = columns[i, 0]
@@ -81,7 +81,7 @@ def first_column(columns: Array) -> Array:
 
 @inner
 def spread(plan: Plan, stacked: Array) -> Array:
-    """Each subtask in a column of its own, shape (n, subtasks)."""
+    """Write each subtask into a column of its own, shape (n, subtasks)."""
     columns = np.zeros((len(stacked), len(plan.parts)))
     for i in range(len(stacked)):
         columns[i, plan.owner[i]] = stacked[i]
@@ -90,7 +90,7 @@ def spread(plan: Plan, stacked: Array) -> Array:
 
 @inner
 def picked(plan: Plan, columns: Array) -> Array:
-    """Of each subtask what its own column has, shape (n,)."""
+    """Read each subtask from its own column, shape (n,); inverse of `spread`."""
     result = np.empty(len(columns))
     for i in range(len(columns)):
         result[i] = columns[i, plan.owner[i]]
@@ -99,7 +99,7 @@ def picked(plan: Plan, columns: Array) -> Array:
 
 @inner
 def times(blocks: Array, own: Array) -> Array:
-    """Each robot's block times its columns."""
+    """Multiply each robot's block by the robot's columns."""
     result = np.empty(own.shape)
     for k in range(len(own)):
         product(blocks, k, own, k, result, k)
@@ -108,7 +108,7 @@ def times(blocks: Array, own: Array) -> Array:
 
 @inner
 def mixed(plan: Plan, A: MixingArrays, own: Array) -> Array:
-    """A t, stacked."""
+    """Return A t, stacked."""
     h, s = A.G.shape[1], own.shape[2]
     c, r = np.empty((1, h, s)), np.empty((len(plan.steps), h, s))
     mix(plan.steps, plan.framed, A, own, c, r)
