@@ -24,7 +24,7 @@ from noninteract_ros.reporting.metrics.zero_order_hold import recorded_hold_forc
 from noninteract_ros.reporting.recording.recorded import Recorded
 from noninteract_ros.reporting.rehearsed.comparison import Comparer
 
-FORMAT = 1
+FORMAT = 2
 LEVELS = ("OK", "WARN", "ERROR", "STALE")
 
 
