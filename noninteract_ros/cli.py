@@ -51,10 +51,9 @@ def main() -> int:
 
 def _usage_error(error: Exception) -> int:
     """Print the usage error of a command line; raise any other exception again."""
-    show = getattr(error, "show", None)
-    if show is None:
+    if not hasattr(error, "show"):
         raise error
-    show()
+    error.show()
     return int(getattr(error, "exit_code", 2))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The console's HTTP and WebSocket server, with a thread and an event loop of its own."""
+"""HTTP and WebSocket server of the console, with its own thread and event loop."""
 
 import asyncio
 import hmac
