@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Kinds of subtask as a user writes them, outside the package."""
+"""Kinds of subtask of a user, outside the package."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

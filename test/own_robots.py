@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots as drivers under ros2_control show them, and a controller whose time a test makes."""
+"""Drivers of robots under ros2_control, and a controller that a test steps."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -19,7 +19,7 @@ from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.files import read_parameters
 from noninteract_ros.simulation.team_simulation import TeamSimulation
 
-WIRING = (
+TOPIC_KEYS = (
     "joint_states_topic",
     "joint_states_rate",
     "joint_prefix",
@@ -30,15 +30,15 @@ WIRING = (
 
 
 def own_robots(**changes: Any) -> dict[str, Any]:
-    """The scenario own_robots without its sources, in wall time, with changes."""
+    """Scenario own_robots without its sources, in wall time, with changes."""
     values = read_parameters(ROOT / "config" / "own_robots.yaml")
     alone = {"haptic": None, "planner": None, "lockstep_sources": None, "lockstep": False}
     return merged(merged(values, alone), changes)
 
 
-def one_topic(values: Mapping[str, Any]) -> dict[str, Any]:
-    """The same scenario on the team's topics."""
-    bare = dict.fromkeys(WIRING)
+def with_team_topics(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Scenario with the robots on the team's topics."""
+    bare = dict.fromkeys(TOPIC_KEYS)
     return merged(values, dict.fromkeys(values["robots"], bare))
 
 
@@ -47,9 +47,9 @@ class Driver:
     """One arm's joint_state_broadcaster and effort controller.
 
     Attributes:
-        order: What the broadcaster tells of, in its order; whatever is no joint stands still.
+        order: Names in the joint states, in order; a name that is no joint stands still.
         efforts: Joints of the effort controller, in its order.
-        torque: What the controller was told last, by joint; zeros before.
+        torque: Last received effort of each joint; zeros before the first.
     """
 
     states_topic: str
@@ -61,7 +61,7 @@ class Driver:
     torque: dict[str, float] = field(default_factory=dict)
 
     def state(self, stamp: int, q: np.ndarray, v: np.ndarray) -> bytes:
-        """What it tells of a moment [ns]; of efforts it knows none."""
+        """Encode the joint states at a stamp [ns], without efforts."""
         moving = dict(zip(self.joints, zip(q, v, strict=True), strict=True))
         rows = [moving.get(name, (0.02, 0.0)) for name in self.order]
         message = JointState(name=self.order)
@@ -70,20 +70,20 @@ class Driver:
         message.effort = [float("nan")] * len(rows)
         return serialize_message(message)
 
-    def hear(self, data: bytes) -> None:
-        """Takes an array as a forward_command_controller does: by its order, nothing else."""
-        told = deserialize_message(data, Float64MultiArray).data
-        assert len(told) == len(self.efforts)
-        self.torque = dict(zip(self.efforts, told, strict=True))
+    def receive(self, data: bytes) -> None:
+        """Receive efforts as a forward_command_controller does: by their order only."""
+        efforts = deserialize_message(data, Float64MultiArray).data
+        assert len(efforts) == len(self.efforts)
+        self.torque = dict(zip(self.efforts, efforts, strict=True))
 
     def applied(self, gravity: np.ndarray) -> np.ndarray:
-        """Torque of its motors."""
-        told = np.array([self.torque.get(joint, 0.0) for joint in self.joints])
-        return told + gravity if self.compensates else told
+        """Torque of the motors."""
+        efforts = np.array([self.torque.get(joint, 0.0) for joint in self.joints])
+        return efforts + gravity if self.compensates else efforts
 
 
 def drivers() -> dict[str, Driver]:
-    """The two arms of own_robots; each broadcaster has its own idea of order."""
+    """Drivers of the two arms of own_robots, each with its own order of joints."""
     left, right = ["left_joint_1", "left_joint_2"], ["joint_1", "joint_2"]
     return {
         "left": Driver(
@@ -104,51 +104,51 @@ def drivers() -> dict[str, Driver]:
     }
 
 
-class _Tap:
-    """In the place of a publisher: keeps what is published."""
+class _RecordingPublisher:
+    """Replacement of a publisher that records the messages."""
 
     def __init__(self, kept: list[Any]) -> None:
         self.publish = kept.append
 
 
-class HandDriven(Controller):
-    """A controller that nobody spins: a test calls what comes in and reads what goes out.
+class SteppedController(Controller):
+    """Controller without an executor: a test delivers messages and reads the published ones.
 
     Attributes:
-        said: Messages by full topic.
+        published: Messages by full topic.
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        self.said: dict[str, list[Any]] = {}
+        self.published: dict[str, list[Any]] = {}
         super().__init__(**kwargs)
 
     def create_publisher(self, kind: Any, topic: str, *args: Any, **kwargs: Any) -> Any:
-        """A tap of the topic, but for those of rclpy itself."""
+        """Record messages, except on topics of rclpy itself."""
         if topic.startswith(("~", "/")):
             return super().create_publisher(kind, topic, *args, **kwargs)
-        return _Tap(self.said.setdefault(self.resolve_topic_name(topic), []))
+        return _RecordingPublisher(self.published.setdefault(self.resolve_topic_name(topic), []))
 
-    def services_answer(self, name: str) -> Trigger.Response:
-        """What `~/stop` or `~/resume` answers."""
+    def call_service(self, name: str) -> Trigger.Response:
+        """Call `~/stop` or `~/resume` and return the response."""
         service = next(item for item in self.services if item.srv_name.endswith(f"/{name}"))
         return service.callback(Trigger.Request(), Trigger.Response())
 
-    def hear(self, topic: str, message: Any) -> None:
-        """Something comes in on a full topic."""
-        heard = [item for item in self.subscriptions if item.topic_name == topic]
-        assert heard, topic
-        for item in heard:
+    def receive(self, topic: str, message: Any) -> None:
+        """Deliver a message to the subscriptions of a full topic."""
+        subscriptions = [item for item in self.subscriptions if item.topic_name == topic]
+        assert subscriptions, topic
+        for item in subscriptions:
             item.callback(message)
 
 
-def hand_driven(ros: Any, values: Mapping[str, Any]) -> HandDriven:
-    """A controller of a scenario, in a harness's context."""
+def stepped_controller(ros: Any, values: Mapping[str, Any]) -> SteppedController:
+    """Controller of a scenario, in a harness's context."""
     overrides = [Parameter(key, value=value) for key, value in flat(values)]
-    return HandDriven(context=ros.context, parameter_overrides=overrides)
+    return SteppedController(context=ros.context, parameter_overrides=overrides)
 
 
-class Hall:
-    """Two arms under gravity, their drivers and a controller; its time is that of the test.
+class SimulatedArms:
+    """Two arms under gravity, their drivers and a controller, in simulated time.
 
     Args:
         ros: Harness.
@@ -164,34 +164,34 @@ class Hall:
         plant = self.scenario.build_simulation(team, self.stack).plant
         pushes = list(self.scenario.pushes.values())
         self.simulation = TeamSimulation(plant, 1000.0 * steps, pushes=pushes)
-        self.controller = hand_driven(ros, values)
+        self.controller = stepped_controller(ros, values)
 
     def stamp(self) -> int:
         """Simulated time [ns], from one second on."""
         return 10**9 + round(1e9 * self.simulation.now)
 
     def state(self, name: str) -> bytes:
-        """What a robot tells of itself now."""
+        """Encode the current joint states of a robot."""
         part = self._part(name)
         q, v = self.simulation.q[part], self.simulation.v[part]
         return self.drivers[name].state(self.stamp(), q, v)
 
-    def tell(self, *names: str) -> None:
-        """Robots tell their states."""
+    def publish_states(self, *names: str) -> None:
+        """Deliver the current states of robots to the controller."""
         for name in names:
-            self.controller.hear(self.drivers[name].states_topic, self.state(name))
+            self.controller.receive(self.drivers[name].states_topic, self.state(name))
 
-    def turn(self) -> None:
-        """The controller takes a turn, and the drivers hear what it says."""
+    def run_controller(self) -> None:
+        """Run the controller once, and deliver its efforts to the drivers."""
         self.controller.run_once()
         for driver in self.drivers.values():
-            said = self.controller.said[driver.effort_topic]
-            if said:
-                driver.hear(said[-1])
-                said.clear()
+            efforts = self.controller.published[driver.effort_topic]
+            if efforts:
+                driver.receive(efforts[-1])
+                efforts.clear()
 
     def step(self) -> None:
-        """A tick of the simulation under the drivers' torques."""
+        """Step the simulation under the drivers' torques."""
         gravity = self.team.gravity(self.simulation.q)
         parts = [
             driver.applied(gravity[self._part(name)]) for name, driver in self.drivers.items()
@@ -199,14 +199,14 @@ class Hall:
         self.simulation.step(np.concatenate(parts))
 
     def error(self, subtask: str) -> float:
-        """How far a subtask is from where it was at the start [m]."""
+        """Largest deviation of a subtask from its start [m]."""
         part = self.stack.value_slices[self.stack.names.index(subtask)]
         start = self.stack.evaluate(self.team.state(self.team.q0, np.zeros(self.team.n))).x
         now = self.stack.evaluate(self.team.state(self.simulation.q, self.simulation.v)).x
         return float(np.abs(now - start)[part].max())
 
     def status(self) -> tuple[int, str]:
-        """Level and sentence that the controller would tell."""
+        """Level and text of the controller's diagnostics."""
         level, text, _ = self.controller.status()
         return int(level), text
 

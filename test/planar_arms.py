@@ -78,7 +78,7 @@ class PlanarArms:
         return self.state(q, v)
 
     def robots(self) -> list[Robot]:
-        """The same arms as Pinocchio models, all bases at the origin."""
+        """Pinocchio models of the arms, with all bases at the origin."""
         return [arm(f"arm_{i + 1}", *masses) for i, masses in enumerate(self.masses)]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Two Pandas that carry a box, led in six degrees of freedom over a link that delays and loses."""
+"""Two Pandas that carry a box, led in six degrees of freedom over a link with delay and loss."""
 
 from typing import Any
 

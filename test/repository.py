@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What the tests of the package as a whole know about its repository."""
+"""Facts about the repository, for the tests of the package as a whole."""
 
 import os
 from distutils.core import run_setup
@@ -12,7 +12,7 @@ PACKAGE = "noninteract_ros"
 
 
 def distribution() -> Distribution:
-    """What setup.py declares, read without building anything."""
+    """Return the metadata of setup.py, without building anything."""
     before = Path.cwd()
     os.chdir(ROOT)  # setup.py finds its data files relative to itself.
     try:
@@ -22,6 +22,6 @@ def distribution() -> Distribution:
 
 
 def programs() -> dict[str, str]:
-    """Name of each program and the function that it runs, from setup.py's entry points."""
+    """Return the function of each program, by name, from setup.py's entry points."""
     scripts = distribution().entry_points["console_scripts"]
     return dict(script.split(" = ") for script in scripts)

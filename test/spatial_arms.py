@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Spatial arms without any file: six or seven revolute joints, thick links, unlike masses."""
+"""Generated spatial arms: six or seven revolute joints, thick links, different masses."""
 
 from collections.abc import Sequence
 
@@ -35,11 +35,18 @@ def spatial_arm(
     tool = pin.SE3(pin.utils.rotate("x", 0.4), np.array([0.02, 0.03, 0.1]))
     model.addFrame(pin.Frame("tool", parent, tool, pin.FrameType.OP_FRAME))
     q = np.array(start[: len(axes)], dtype=float)
-    return Robot(name, model, "tool", q, ("x", "y", "z"), 1.0)
+    return Robot(
+        name=name,
+        model=model,
+        tool_frame="tool",
+        initial_position=q,
+        axes=("x", "y", "z"),
+        brake_damping=1.0,
+    )
 
 
 def spatial_team(count: int = 2, axes: str = "zyzyzy") -> Team:
-    """Unlike arms `arm_1`, `arm_2`, ... side by side, their tools pointing almost alike."""
+    """Different arms `arm_1`, `arm_2`, ... side by side, with similar tool orientations."""
     bend = np.array([0.0, 0.25, -0.2, 0.15, 0.2, -0.1, 0.1])
     robots = []
     for i in range(count):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Accelerations beyond their bound at a hand-over: they come back by jerk, not by a step."""
+"""Accelerations beyond their bound at a hand-over: reduced with bounded jerk, without a step."""
 
 from collections.abc import Callable
 
@@ -42,10 +42,7 @@ TAKERS = {
 
 
 def left(velocity: np.ndarray, acceleration: np.ndarray) -> DesiredMotion:
-    """A motion whose source leaves it with a velocity and an acceleration, shape (6,) each.
-
-    The source goes steadily for a while, until it is followed exactly, and accelerates at last.
-    """
+    """Motion whose source leaves it with a velocity and an acceleration, shape (6,) each."""
     value = np.concatenate([[0.4, 0.1, 0.2], so3.exp(np.array([0.5, 0.1, -0.3]))])
     end, v, a = Reference.at_rest(value, POSE), velocity, acceleration
 
@@ -67,7 +64,7 @@ def left(velocity: np.ndarray, acceleration: np.ndarray) -> DesiredMotion:
 def hand_over(
     desired: DesiredMotion, taker: Callable[[float], MotionInput | None], seconds: float
 ) -> list[Reference]:
-    """The motion from the last one of the former source on."""
+    """Motion from the last one of the former source on."""
     count = round(seconds / STEP)
     return [desired.now, *(desired.advance(taker(k * STEP), STEP) for k in range(1, count + 1))]
 
@@ -77,11 +74,8 @@ def accelerations(way: list[Reference]) -> np.ndarray:
 
 
 @pytest.mark.parametrize("name", TAKERS)
-def test_the_acceleration_never_steps_whoever_takes_over(name: str) -> None:
-    """From any that two sources within the bounds can differ by: |da| <= max_jerk dt, all along.
-
-    Rotations turn their bounded numbers with them; what that adds is bounded by the rates.
-    """
+def test_the_acceleration_never_steps_at_a_take_over(name: str) -> None:
+    """For any difference of two sources within the bounds, |da| <= max_jerk dt all along."""
     rng = np.random.default_rng(5)
     own = np.array([np.abs(size * w**3).max() for size, w in (np.array(SWAYS),)]).max()
     for _ in range(4):
@@ -98,8 +92,8 @@ def test_the_acceleration_never_steps_whoever_takes_over(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", TAKERS)
-def test_what_is_asked_for_is_reached_all_the_same(name: str) -> None:
-    """The way back leads on to who took over, each number the derivative of the one before."""
+def test_the_new_source_is_reached(name: str) -> None:
+    """The motion ends on that of the new source; all derivatives are consistent."""
     way = hand_over(left(0.3 * MAX_VELOCITY, 1.8 * MAX_ACCELERATION), TAKERS[name], 6.0)
     asked, end = TAKERS[name](6.0), way[-1]
     if isinstance(asked, Rate):
@@ -116,8 +110,8 @@ def test_what_is_asked_for_is_reached_all_the_same(name: str) -> None:
     assert np.abs(drift).max() <= 1.1 * MAX_JERK[0] * STEP**2 / 4.0
 
 
-def test_as_far_as_the_velocity_allows_more_than_twice_comes_back_too() -> None:
-    """With a jerk that is quick, a hard push of a hand ends without a step and within bounds."""
+def test_larger_accelerations_are_reduced_without_a_step_within_the_velocity_bound() -> None:
+    """With a high jerk, a hard push of the hand ends without a step and within bounds."""
     bounds = np.array([[1.0], [5.0], [1000.0]])
     desired = DesiredMotion(bounds, True)
     desired.advance(Reference(np.zeros(1), np.array([0.2]), np.array([38.0])), STEP)
@@ -128,8 +122,8 @@ def test_as_far_as_the_velocity_allows_more_than_twice_comes_back_too() -> None:
 
 
 @pytest.mark.parametrize("acceleration", [30.0, -500.0, 1e9])
-def test_what_no_bound_holds_for_is_cut_and_carries_nobody_away(acceleration: float) -> None:
-    """Beyond both, it is cut to twice the bound: at most 2 max_velocity and 0.4 m come of it."""
+def test_accelerations_beyond_both_bounds_are_cut(acceleration: float) -> None:
+    """Beyond both, it is cut to twice the bound: at most 2 max_velocity and 0.4 m result."""
     desired = DesiredMotion(BOUNDS[:, :1], True)
     desired.advance(Reference(np.zeros(1), np.zeros(1), np.array([acceleration])), STEP)
     way = hand_over(desired, TAKERS["nobody"], 2.0)

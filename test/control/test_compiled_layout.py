@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Single values and motions differ as those of the layout for any number of values."""
+"""Compiled differences of single values and motions equal those of the layout."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from noninteract_ros.subtasks import so3
 from noninteract_ros.subtasks.layout import Layout
 
 LAYOUTS = {
-    "plain": Layout((2, 1), (False, False)),
+    "scalars": Layout((2, 1), (False, False)),
     "poses": Layout((3, 3), (True, True)),
     "mixed": Layout((0, 2, 1), (True, False, True)),
 }
@@ -25,7 +25,7 @@ def motion(layout, rng, size):
 @pytest.mark.parametrize("name", LAYOUTS)
 @pytest.mark.parametrize("size", [0.0, 1e-9, 0.3, 2.0])
 @pytest.mark.parametrize("dt", [0.0, 0.001, 0.7])
-def test_both_find_the_same(name, size, dt):
+def test_compiled_differences_equal_those_of_the_layout(name, size, dt):
     layout, rng = LAYOUTS[name], np.random.default_rng(0)
     for _ in range(5):
         here, before = motion(layout, rng, size), motion(layout, rng, size)
@@ -37,7 +37,7 @@ def test_both_find_the_same(name, size, dt):
             np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-12)
 
 
-def test_angles_go_the_shorter_way_round():
+def test_differences_of_angles_are_the_shortest_ones():
     layout = Layout((2,), (False,), (True,))
     x, x_d = np.array([3.0, 7.0]), np.array([-3.0, 0.0])
     found = CompiledLayout(layout).difference(x, x_d)
@@ -45,7 +45,7 @@ def test_angles_go_the_shorter_way_round():
     np.testing.assert_allclose(found, [6.0 - 2.0 * np.pi, 7.0 - 2.0 * np.pi], atol=1e-15)
 
 
-def test_arrays_that_are_only_for_reading_will_do():
+def test_read_only_arrays_are_accepted():
     layout = CompiledLayout(LAYOUTS["poses"])
     x = layout.identity.copy()
     x.flags.writeable = False

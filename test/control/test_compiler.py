@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Machine code is kept for the next process, and never longer than the sources it came from."""
+"""Machine code is cached for the next process, until its sources change."""
 
 import shutil
 import subprocess
@@ -17,14 +17,14 @@ ASK = "from outside import doubled; print(doubled(), *doubled.stats.cache_hits.v
 
 
 def answer(folder: Path) -> list[int]:
-    """What the compiled function gives, and 1 for each time that kept code was found."""
+    """Result of the compiled function, and 1 for each cache hit."""
     command = [sys.executable, "-c", ASK]
     run = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
     return [int(word) for word in run.stdout.split()]
 
 
-def test_code_is_kept_until_what_it_calls_changes(tmp_path: Path) -> None:
-    """A change in the file of an inner function reaches the kept code of its caller."""
+def test_code_is_cached_until_what_it_calls_changes(tmp_path: Path) -> None:
+    """A change in the file of an inner function invalidates the cached code of its caller."""
     shutil.copy(Path(str(compiler.__file__)), tmp_path / "compiler.py")
     (tmp_path / "outside.py").write_text(OUTER)
     (tmp_path / "inside.py").write_text(INNER.format(1))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The desired motion: within its limits, continuous, and never lost."""
+"""Desired motion: within its limits and continuous."""
 
 import numpy as np
 import pytest
@@ -57,8 +57,8 @@ def assert_is_a_motion(way: list[Reference], limits: np.ndarray = LIMITS) -> Non
     assert (np.abs(x_step - STEP * (v[1:] + v[:-1]) / 2) <= max_acceleration * STEP**2 / 4).all()
 
 
-def test_set_points_rates_and_silence_are_shaped_within_limits():
-    """Whatever is asked for, in any order and half-way, the motion keeps its three limits."""
+def test_set_points_rates_and_timeouts_are_shaped_within_limits():
+    """For all inputs, in any order and half-way, the motion keeps its three limits."""
     desired = motion()
     way = [desired.now]
     for asked in (
@@ -95,8 +95,8 @@ def test_a_rate_is_reached_and_bounded():
 
 
 @pytest.mark.parametrize("direct", [False, True])
-def test_silence_brings_the_motion_to_rest_within_limits(direct):
-    """When a moving reference falls silent, the motion stops within its limits and stays."""
+def test_a_timeout_brings_the_motion_to_rest_within_limits(direct):
+    """When a moving reference times out, the motion stops within its limits and stays."""
     desired = motion(direct)
     run(desired, swing, 6.0)
     way = [desired.now, *run(desired, lambda t: None, 1.0)]
@@ -115,7 +115,7 @@ def test_direct_take_over_passes_the_reference_unchanged():
 
 
 def assert_joins(before: Reference, way: list[Reference]) -> None:
-    """The way leads on from `before`, within the limits on top of the reference's own motion."""
+    """Check that a motion joins `before`, within limits on top of the reference's motion."""
     own = np.array([[0.3, 0.3], [0.45, 0.45], [0.7, 0.7]])  # What `swing` itself needs.
     assert_is_a_motion([before, *way], LIMITS + own)
 
@@ -171,7 +171,7 @@ def test_slow_references_that_are_extrapolated_are_no_jumps():
     assert worst < 1e-6
 
 
-def test_a_noisy_reference_is_followed_not_fled():
+def test_a_noisy_reference_is_followed():
     """References that jump at every tick keep the motion near their mean."""
     desired = motion()
     rng = np.random.default_rng(2)
@@ -184,8 +184,8 @@ def test_a_noisy_reference_is_followed_not_fled():
     np.testing.assert_allclose(columns(way)[0][-2000:], 1.0, atol=0.05)
 
 
-def test_a_spike_of_acceleration_before_silence_carries_nothing_away():
-    """A source whose last word is an acceleration of 500 m/s^2 leaves the motion where it was."""
+def test_a_spike_of_acceleration_before_a_timeout_moves_nothing():
+    """A source whose last input is an acceleration of 500 m/s^2 leaves the motion where it was."""
     desired = motion(direct=True)
     desired.advance(Reference(START, np.zeros(2), np.array([500.0, -300.0])), STEP)
     way = run(desired, lambda t: None, 3.0)
@@ -194,7 +194,7 @@ def test_a_spike_of_acceleration_before_silence_carries_nothing_away():
 
 
 @pytest.mark.parametrize("distance", [1e4, 1e9, 1e15])
-def test_a_set_point_out_of_this_world_is_approached_at_the_limit(distance):
+def test_a_very_distant_set_point_is_approached_at_the_limit(distance):
     """A target far beyond what can be planned is approached at bounded velocity, without error."""
     desired = motion()
     way = run(desired, lambda t: target(distance, -distance), 1.0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Desired motions that turn: within limits, continuous, on SO(3) with exact derivatives."""
+"""Desired motions with rotations: within limits, continuous, on SO(3) with exact derivatives."""
 
 from itertools import pairwise
 
@@ -42,7 +42,7 @@ def run(desired: DesiredMotion, asked, seconds: float, start: float = 0.0) -> li
 
 
 def assert_is_a_motion(way: list[Reference]) -> None:
-    """Each derivative is that of the one before, with steps as bounded as the limits ask."""
+    """Each derivative is that of the one before, with steps bounded by the limits."""
     max_velocity, max_acceleration, max_jerk = LIMITS[:, 4]
     v, a = (
         np.array([getattr(item, name) for item in way]) for name in ("velocity", "acceleration")
@@ -60,7 +60,7 @@ def assert_is_a_motion(way: list[Reference]) -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_set_point_is_turned_to_and_held(sign):
-    """It ends at rest in the target, whatever the sign of its quaternion."""
+    """The motion ends at rest in the target, for both signs of its quaternion."""
     aim = value(*TURN)
     aim[2:] *= sign
     way = run(motion(), lambda t: Target(aim, np.zeros(5)), 4.0)
@@ -83,7 +83,7 @@ def test_a_set_point_half_a_turn_away_is_reached_without_a_jump(angle):
     assert (np.diff(middle[: len(way) // 4]) >= -1e-9).all()
 
 
-def test_set_points_rates_and_silence_follow_each_other_smoothly():
+def test_set_points_rates_and_timeouts_follow_each_other_smoothly():
     """Angular velocity and acceleration never jump as the input changes."""
     desired = motion()
     rate = np.array([0.2, 0.0, 0.7, -0.5, 0.3])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Potentials, their gradients, and gains per_coordinate over coordinates."""
+"""Potentials, their gradients, and gains by coordinate."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_potential_is_zero_at_the_target_and_positive_elsewhere():
 
 
 def test_saturating_force_stays_below_its_bound():
-    """However far the error, the force of a saturating potential is below max_force."""
+    """For any error, the force of a saturating potential is below max_force."""
     far = IMPEDANCE.force(np.full(5, 1e3))
     assert (np.abs(far) <= BOUND).all()
     np.testing.assert_allclose(far[3:], BOUND[3:], rtol=1e-3)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The inputs of one source, by stamp."""
+"""Inputs of one source, by stamp."""
 
 import numpy as np
 import pytest
@@ -12,8 +12,8 @@ def rate(value: float) -> Rate:
     return Rate(np.array([value]))
 
 
-def test_inputs_hold_from_their_stamps_on():
-    """An input is in force from its stamp until the next one's, whenever it came."""
+def test_inputs_are_valid_from_their_stamps_on():
+    """An input is valid from its stamp until that of the next one, at any time of receipt."""
     source = Source()
     assert source.motion(10.0) is None
     for stamp in (1.0, 2.0, 2.5):
@@ -26,7 +26,7 @@ def test_inputs_hold_from_their_stamps_on():
 
 
 def test_of_one_stamp_the_last_counts():
-    """Two inputs of one stamp are both taken; the later one is in force."""
+    """Of two inputs with one stamp, the later one is valid."""
     source = Source()
     source.receive(1.0, rate(1.0), now=1.0)
     source.receive(1.0, rate(2.0), now=1.0)
@@ -34,8 +34,8 @@ def test_of_one_stamp_the_last_counts():
 
 
 @pytest.mark.parametrize("asked_for", [False, True])
-def test_a_stamp_that_goes_back_is_refused(asked_for):
-    """An input older than the last one is refused, whether that waits or is in force."""
+def test_a_stamp_that_goes_back_is_rejected(asked_for):
+    """An input older than the last one is rejected, whether that is pending or valid."""
     source = Source()
     source.receive(1.5, rate(1.0), now=1.0)
     if asked_for:
@@ -45,8 +45,8 @@ def test_a_stamp_that_goes_back_is_refused(asked_for):
     assert source.motion(1.5)[1].velocity == 1.0
 
 
-def test_a_stamp_far_ahead_is_refused():
-    """An input for later than the horizon is refused and does not block what comes after."""
+def test_a_stamp_far_ahead_is_rejected():
+    """An input beyond the horizon is rejected and does not block later ones."""
     source = Source()
     with pytest.raises(InputError, match="ahead of the team's time"):
         source.receive(2.0 + HORIZON, rate(1.0), now=1.0)
@@ -54,8 +54,8 @@ def test_a_stamp_far_ahead_is_refused():
     assert source.motion(1.2)[1].velocity == 2.0
 
 
-def test_forces_and_motions_do_not_displace_each_other():
-    """A force input leaves the motion in force, and has an order of stamps of its own."""
+def test_forces_and_motions_are_independent():
+    """A force input leaves the motion valid, and has an order of stamps of its own."""
     source = Source()
     source.receive(1.0, rate(1.0), now=1.0)
     source.receive(0.5, Force(np.array([3.0])), now=1.0)
@@ -63,8 +63,8 @@ def test_forces_and_motions_do_not_displace_each_other():
     assert source.force(1.0)[1].force == 3.0
 
 
-def test_markers_and_motions_say_how_far_the_source_has_spoken():
-    """`complete_until` is the latest stamp of a motion or marker; it never goes back."""
+def test_markers_and_motions_set_complete_until():
+    """`complete_until` is the latest stamp of a motion or marker; it never decreases."""
     source = Source()
     assert source.complete_until == -np.inf
     source.receive(1.0, rate(1.0), now=1.0)
@@ -74,8 +74,8 @@ def test_markers_and_motions_say_how_far_the_source_has_spoken():
     assert source.complete_until == 3.0
 
 
-def test_forget_drops_what_came_but_not_how_far_it_was_spoken():
-    """After `forget` nothing is in force and any stamp is welcome."""
+def test_discarding_inputs_keeps_complete_until():
+    """After `discard_inputs` no input is valid and any stamp is accepted."""
     source = Source()
     source.receive(1.0, rate(1.0), now=1.0)
     source.receive(1.0, Force(np.array([3.0])), now=1.0)

@@ -26,12 +26,12 @@ def test_extrapolation_composes():
         np.testing.assert_allclose(there.velocity, direct.velocity, rtol=1e-14)
 
 
-def test_still_copies_its_position_and_stays():
-    """A still reference is float64, keeps its own copy and never moves."""
+def test_a_reference_at_rest_copies_its_position_and_stays():
+    """A reference at rest is float64, keeps its own copy and never moves."""
     place = [1, 2]
     array = np.array(place, dtype=float)
-    still = Reference.at_rest(array)
+    rest = Reference.at_rest(array)
     array += 1.0
     assert Reference.at_rest(place).position.dtype == np.float64
-    np.testing.assert_array_equal(still.extrapolate(100.0).position, [1.0, 2.0])
-    np.testing.assert_array_equal(still.velocity, [0.0, 0.0])
+    np.testing.assert_array_equal(rest.extrapolate(100.0).position, [1.0, 2.0])
+    np.testing.assert_array_equal(rest.velocity, [0.0, 0.0])

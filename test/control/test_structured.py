@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The law robot by robot equals the dense one, at a cost that grows with the team, not faster."""
+"""Equality of the robot-by-robot and the dense law, and linear cost in the number of robots."""
 
 import os
 import subprocess
@@ -91,7 +91,7 @@ CASES = {
 
 
 class Pair:
-    """The same team both ways, at a random state with random errors."""
+    """One team in both forms, at a random state with random errors."""
 
     def __init__(self, name, seed, chosen=False):
         count, keys, sizes = CASES[name]
@@ -142,7 +142,7 @@ class TestBothForms:
             assert_close(seen.dynamics.joint_acceleration(pair.v, wanted), a)
 
     @pytest.mark.parametrize("law", ["noninteracting", "natural", "paper"])
-    def test_ask_for_the_same_torque(self, name, seed, chosen, law):
+    def test_find_the_same_torque(self, name, seed, chosen, law):
         pair = Pair(name, seed, chosen)
         assert_close(pair.torque(pair.structured, law), pair.torque(pair.dense, law))
 
@@ -161,7 +161,7 @@ class TestBothForms:
         found = regularity(pair.structured.dynamics.inverse_sizes)
         assert found == pytest.approx(regularity(pair.dense.dynamics.S), rel=1e-9)
 
-    def test_have_the_same_matrices_for_who_asks(self, name, seed, chosen):
+    def test_have_the_same_matrices(self, name, seed, chosen):
         pair = Pair(name, seed, chosen)
         for part in ("M", "C", "g", "J", "J_rate", "S", "MS", "inertia"):
             found = getattr(pair.structured.dynamics, part)
@@ -268,7 +268,7 @@ print(Counted.reads)
 
 
 def reads_of_law(count):
-    """How often the law reads a number of the team, counted in its uncompiled functions."""
+    """Number of times the law reads a number of the team, in its uncompiled functions."""
     paths = [str(Path(__file__).parent), *sys.path]
     environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": os.pathsep.join(paths)}
     command = [sys.executable, "-c", WORK, str(count)]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Authority, silence and force inputs of one subtask."""
+"""Authority, timeout and force inputs of one subtask."""
 
 import numpy as np
 import pytest
@@ -49,8 +49,8 @@ def test_a_source_without_authority_changes_nothing_at_all():
         assert a.source == b.source == "human"
 
 
-def test_hold_listens_to_nobody():
-    """Under `hold` the subtask stays, whatever both sources say, and is not called silent."""
+def test_hold_ignores_all_sources():
+    """Under `hold` the subtask stays for any inputs, and is not reported silent."""
     item = led_by("hold")
     for name in ("human", "autonomy"):
         item.sources[name].receive(0.0, Rate(np.ones(2)), 0.0)
@@ -62,7 +62,7 @@ def test_hold_listens_to_nobody():
 
 
 def test_references_are_extrapolated_from_their_stamps():
-    """A reference older than the tick is carried on by its velocity and acceleration."""
+    """A reference older than the tick is extrapolated by its velocity and acceleration."""
     item = led_by("human", takeover="direct")
     spoken = Reference(np.array([1.0, 2.0]), np.array([0.3, 0.0]), np.array([0.0, 0.4]))
     item.sources["human"].receive(0.1, spoken, 0.1)
@@ -72,7 +72,7 @@ def test_references_are_extrapolated_from_their_stamps():
 
 
 @pytest.mark.parametrize("takeover", ["direct", "shaped"])
-def test_silence_leaves_the_subtask_at_rest_and_says_so(takeover):
+def test_a_timeout_leaves_the_subtask_at_rest_and_is_reported(takeover):
     """After the timeout, not before, the source counts as silent and the subtask comes to rest."""
     item = led_by("human", timeout=0.1, takeover=takeover)
     assert item.advance(0.0, 0.0).silent
@@ -86,8 +86,8 @@ def test_silence_leaves_the_subtask_at_rest_and_says_so(takeover):
     assert 0.04 < led[-1].reference.position[0] - START[0] < 0.2
 
 
-def test_fresh_input_after_silence_takes_over_without_a_jump():
-    """A source that speaks again far away is joined from where the subtask rests."""
+def test_fresh_input_after_a_timeout_takes_over_without_a_jump():
+    """A source that resumes far away is approached from where the subtask rests."""
     item = led_by("human", timeout=0.05)
     item.sources["human"].receive(0.0, Reference.at_rest([0.5, 0.2]), 0.0)
     ticks(item, 1, 500)
@@ -100,7 +100,7 @@ def test_fresh_input_after_silence_takes_over_without_a_jump():
 
 
 def test_change_of_authority_has_no_jump():
-    """Handing over between two sources that want different things goes on from where it is."""
+    """A hand-over between sources with different references continues from the current motion."""
     item = led_by("human")
     last = None
     for k in range(3000):
@@ -117,7 +117,7 @@ def test_change_of_authority_has_no_jump():
 
 
 def test_force_input_is_bounded_and_slewed():
-    """A force far too large rises at its rate bound, stays at its bound and falls in silence."""
+    """A large force rises at its rate bound, stays at its bound and falls after the timeout."""
     item = led_by("human", timeout=0.5, max_wrench=(20.0, 5.0), max_wrench_rate=(100.0,))
     item.sources["human"].receive(0.0, Force(np.array([1e6, -1e6])), 0.0)
     forces = np.array([led.force for led in ticks(item, 0, 1000)])
@@ -135,7 +135,7 @@ def test_a_force_within_its_bounds_passes_unchanged():
 
 
 def test_a_source_that_only_gives_force_is_not_silent():
-    """A force input is a way to lead (remark 1): the reference rests, the source is heard."""
+    """A force input is a way to lead (remark 1): the reference rests, the source is not silent."""
     item = led_by("human", timeout=0.1)
     item.sources["human"].receive(0.0, Force(np.ones(2)), 0.0)
     led = ticks(item, 0, 200)

@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 from harness import Ros
-from own_robots import Hall, HandDriven, drivers, hand_driven, one_topic, own_robots
+from own_robots import (
+    SimulatedArms,
+    SteppedController,
+    drivers,
+    own_robots,
+    stepped_controller,
+    with_team_topics,
+)
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from waiting import until
@@ -21,14 +28,14 @@ PATIENT = {"state_timeout": 1000.0}
 
 
 @pytest.fixture
-def halls(ros: Ros) -> Iterator[Any]:
-    """A maker of halls that are cleared away."""
-    made: list[HandDriven] = []
+def make_arms(ros: Ros) -> Iterator[Any]:
+    """Factory of simulated arms whose controllers are destroyed after the test."""
+    made: list[SteppedController] = []
 
-    def make(**changes: Any) -> Hall:
-        hall = Hall(ros, own_robots(**(PATIENT | changes)))
-        made.append(hall.controller)
-        return hall
+    def make(**changes: Any) -> SimulatedArms:
+        arms = SimulatedArms(ros, own_robots(**(PATIENT | changes)))
+        made.append(arms.controller)
+        return arms
 
     yield make
     for controller in made:
@@ -36,81 +43,86 @@ def halls(ros: Ros) -> Iterator[Any]:
 
 
 def test_equal_stamps_are_the_single_topic_to_the_bit(ros: Ros) -> None:
-    """States told robot by robot, in any order, are answered as the same states on one topic."""
+    """States received by robot, in any order, give the same commands as those on one topic."""
     values = own_robots(**PATIENT)
-    apart, together = hand_driven(ros, values), hand_driven(ros, one_topic(values))
+    apart, together = (
+        stepped_controller(ros, values),
+        stepped_controller(ros, with_team_topics(values)),
+    )
     team = Scenario.from_dict(values).build_team()
     codec = JointStateCodec(team.joint_names)
     rng = np.random.default_rng(4)
     arms = drivers()
     for tick in range(1, 40):
         q, v = team.q0 + rng.uniform(-0.02, 0.02, 4), rng.uniform(-1.0, 1.0, 4)
-        together.hear("/team/joint_states", codec.encode(10**6 * tick, q, v))
+        together.receive("/team/joint_states", codec.encode(10**6 * tick, q, v))
         together.run_once()
         for name in rng.permutation(team.names):
             part = team.velocity_slices[team.index(name)]
             data = arms[name].state(10**6 * tick, q[part], v[part])
-            apart.hear(arms[name].states_topic, data)
+            apart.receive(arms[name].states_topic, data)
         apart.run_once()
-        assert together.said["/team/joint_commands"] == apart.said["/team/joint_commands"]
-        expected = codec.decode(together.said["/team/joint_commands"][-1])
-        told = codec.decode(apart.said["/team/joint_states"][-1])
-        np.testing.assert_array_equal([told.position, told.velocity], [q, v])
+        assert (
+            together.published["/team/joint_commands"] == apart.published["/team/joint_commands"]
+        )
+        expected = codec.decode(together.published["/team/joint_commands"][-1])
+        state = codec.decode(apart.published["/team/joint_states"][-1])
+        np.testing.assert_array_equal([state.position, state.velocity], [q, v])
         for name, arm in arms.items():
             part = team.velocity_slices[team.index(name)]
-            arm.hear(apart.said[arm.effort_topic][-1])
+            arm.receive(apart.published[arm.effort_topic][-1])
             applied = arm.applied(team.gravity(q)[part])
             np.testing.assert_allclose(applied, expected.effort[part], rtol=1e-13, atol=1e-13)
-    assert len(apart.said["/team/joint_commands"]) == 39
+    assert len(apart.published["/team/joint_commands"]) == 39
     apart.destroy_node()
     together.destroy_node()
 
 
 class Human:
-    """Leads the middle of the grasp in a hall there and back, at up to 0.5 m/s."""
+    """Source that leads the centre of the grasp there and back, at up to 0.5 m/s."""
 
-    def __init__(self, hall: Hall) -> None:
-        task = hall.stack.subtasks[0]
-        self._hall, self._codec = hall, SubtaskCodec(task.name, task.elements, task.axes)
-        self._start = hall.stack.evaluate(hall.team.state(hall.team.q0, np.zeros(4))).x[:2]
+    def __init__(self, arms: SimulatedArms) -> None:
+        task = arms.stack.subtasks[0]
+        self._arms, self._codec = arms, SubtaskCodec(task.name, task.elements, task.axes)
+        self._start = arms.stack.evaluate(arms.team.state(arms.team.q0, np.zeros(4))).x[:2]
 
     def lead(self, now: float) -> None:
-        """Says where the middle is to be at a time [s]."""
+        """Deliver the reference of the centre at a time [s]."""
         w, along = 2.0 * np.pi / 0.8, np.array([0.04, -0.05])
         shape = np.array([1.0 - np.cos(w * now), w * np.sin(w * now), w**2 * np.cos(w * now)])
         position, velocity, acceleration = shape[:, None] * along
-        words = self._codec.encode(0, self._start + position, velocity, acceleration)
-        self._hall.controller.hear("/team/cooperative/human/reference", words)
+        message = self._codec.encode(0, self._start + position, velocity, acceleration)
+        self._arms.controller.receive("/team/cooperative/human/reference", message)
 
 
-def run(hall: Hall, age: int) -> tuple[float, float]:
-    """Largest relative error [m] and joint acceleration [rad/s^2]; the right arm is heard late.
+def run(arms: SimulatedArms, age: int) -> tuple[float, float]:
+    """Return the largest relative error [m] and joint acceleration [rad/s^2], one arm late.
 
     Args:
-        hall: A hall at two ticks a millisecond, in which the controller takes a turn each.
-        age: How many ticks late.
+        arms: Arms at two ticks per millisecond; the controller runs once in a millisecond.
+        age: Delay of the right arm's states [ticks].
     """
-    told: list[bytes] = []
-    human, error, acceleration = Human(hall), 0.0, 0.0
-    for tick in range(round(0.5 * hall.simulation.rate)):
-        told.append(hall.state("right"))
+    states: list[bytes] = []
+    human, error, acceleration = Human(arms), 0.0, 0.0
+    for tick in range(round(0.5 * arms.simulation.rate)):
+        states.append(arms.state("right"))
         if tick % 2 == 0:
-            hall.tell("left")
-            hall.controller.hear(hall.drivers["right"].states_topic, told[max(0, tick - age)])
-            human.lead(hall.simulation.now)
-            hall.turn()
-        v = hall.simulation.v
-        hall.step()
-        error = max(error, hall.error("relative"))
-        change = float(np.abs(hall.simulation.v - v).max())
-        acceleration = max(acceleration, change * hall.simulation.rate)
-    assert hall.status()[1] == "holding relative: source silent"
+            arms.publish_states("left")
+            arms.controller.receive(arms.drivers["right"].states_topic, states[max(0, tick - age)])
+            human.lead(arms.simulation.now)
+            arms.run_controller()
+        v = arms.simulation.v
+        arms.step()
+        error = max(error, arms.error("relative"))
+        change = float(np.abs(arms.simulation.v - v).max())
+        acceleration = max(acceleration, change * arms.simulation.rate)
+    assert arms.status()[1] == "holding relative: source silent"
     return error, acceleration
 
 
 @pytest.mark.parametrize("prediction", ["velocity", "acceleration"])
 def test_states_of_different_times_cost_what_the_prediction_does(
-    halls: Any, prediction: str
+    make_arms: Any, prediction: str
 ) -> None:
     """Constant velocity lets D / K times the velocity's error through; acceleration far less.
 
@@ -118,11 +130,11 @@ def test_states_of_different_times_cost_what_the_prediction_does(
     spring gives way to the damper's force by D / K of it.
     """
     changes = {"state_prediction": prediction, "cooperative": {"takeover": "direct"}}
-    floor, _ = run(halls(**changes), 0)
+    floor, _ = run(make_arms(**changes), 0)
     assert floor < 1e-5
     errors = []
     for age in (1, 3, 6):  # 0.5, 1.5 and 3 ms
-        error, acceleration = run(halls(**changes), age)
+        error, acceleration = run(make_arms(**changes), age)
         allowed = 90.0 / 900.0 * acceleration * age * 0.5e-3
         if prediction == "velocity":
             assert 0.1 * allowed < error < allowed + floor
@@ -133,104 +145,104 @@ def test_states_of_different_times_cost_what_the_prediction_does(
         np.testing.assert_allclose(np.array(errors) / errors[0], [1.0, 3.0, 6.0], rtol=0.03)
 
 
-def test_a_late_robot_holds_the_whole_team_until_it_is_back(halls: Any) -> None:
+def test_a_late_robot_holds_the_whole_team_until_it_is_back(make_arms: Any) -> None:
     """Who is late is said; the others brake; nobody is pulled when it returns."""
-    hall = halls(cooperative={"takeover": "direct"})
-    human = Human(hall)
+    arms = make_arms(cooperative={"takeover": "direct"})
+    human = Human(arms)
     for tick in range(300):
         human.lead(1e-3 * tick)
-        hall.tell("left", "right")
-        hall.turn()
-        hall.step()
-        hall.step()
-    assert np.abs(hall.simulation.v[:2]).max() > 0.1
-    assert hall.status()[0] < 2
+        arms.publish_states("left", "right")
+        arms.run_controller()
+        arms.step()
+        arms.step()
+    assert np.abs(arms.simulation.v[:2]).max() > 0.1
+    assert arms.status()[0] < 2
     for tick in range(300, 700):
         human.lead(1e-3 * tick)
-        hall.tell("left")
-        hall.turn()
+        arms.publish_states("left")
+        arms.run_controller()
         expected = (2, "holding: states of right are more than 20 ms older than the others")
-        assert (hall.status() == expected) == (tick > 340)
-        hall.step()
-        hall.step()
-    assert np.abs(hall.simulation.v[:2]).max() < 1e-3
-    told = deserialize_message(hall.controller.said["/team/joint_states"][-1], JointState)
-    gravity = hall.team.gravity(np.array(told.position))
-    np.testing.assert_allclose(hall.drivers["right"].applied(gravity[2:]), gravity[2:])
-    assert hall.controller.core.mode.stopped
-    assert not hall.controller.services_answer("resume").success
+        assert (arms.status() == expected) == (tick > 340)
+        arms.step()
+        arms.step()
+    assert np.abs(arms.simulation.v[:2]).max() < 1e-3
+    received = deserialize_message(arms.controller.published["/team/joint_states"][-1], JointState)
+    gravity = arms.team.gravity(np.array(received.position))
+    np.testing.assert_allclose(arms.drivers["right"].applied(gravity[2:]), gravity[2:])
+    assert arms.controller.core.mode.stopped
+    assert not arms.controller.call_service("resume").success
     for _ in range(30):
-        hall.tell("left", "right")
-        hall.turn()
-        hall.step()
-        hall.step()
-    assert not hall.controller.core.mode.stopped
-    assert hall.status()[1].startswith("holding cooperative, relative: source silent")
+        arms.publish_states("left", "right")
+        arms.run_controller()
+        arms.step()
+        arms.step()
+    assert not arms.controller.core.mode.stopped
+    assert arms.status()[1].startswith("holding cooperative, relative: source silent")
 
 
-def test_a_hitch_is_waited_out(halls: Any) -> None:
+def test_a_hitch_is_waited_out(make_arms: Any) -> None:
     """After a silence of all somebody is heard first: the other is waited for, nobody stopped."""
-    hall = halls()
-    hall.tell("left", "right")
-    hall.turn()
+    arms = make_arms()
+    arms.publish_states("left", "right")
+    arms.run_controller()
     for _ in range(50):
-        hall.step()
-    answers = hall.controller.said["/team/joint_commands"]
+        arms.step()
+    answers = arms.controller.published["/team/joint_commands"]
     for name, count in (("left", 1), ("right", 2)):
-        hall.tell(name)
-        hall.turn()
+        arms.publish_states(name)
+        arms.run_controller()
         assert len(answers) == count
-        assert hall.status()[0] < 2
+        assert arms.status()[0] < 2
 
 
-def test_a_stop_that_was_asked_for_outlasts_a_late_robot(halls: Any) -> None:
+def test_a_stop_that_was_asked_for_outlasts_a_late_robot(make_arms: Any) -> None:
     """What a person stopped stays stopped."""
-    hall = halls()
+    arms = make_arms()
     for tick in range(100):
-        hall.tell("left", *(("right",) if not 20 <= tick < 80 else ()))
+        arms.publish_states("left", *(("right",) if not 20 <= tick < 80 else ()))
         if tick == 70:
-            assert hall.status()[0] == 2
-            assert hall.controller.services_answer("stop").success
-        hall.turn()
-        hall.step()
-        hall.step()
-    assert hall.status() == (1, "stopped")
+            assert arms.status()[0] == 2
+            assert arms.controller.call_service("stop").success
+        arms.run_controller()
+        arms.step()
+        arms.step()
+    assert arms.status() == (1, "stopped")
 
 
-def test_before_every_robot_has_spoken_nothing_is_commanded(halls: Any) -> None:
+def test_before_every_robot_has_spoken_nothing_is_commanded(make_arms: Any) -> None:
     """Who has not is named; an arm of which one joint is missing has not."""
-    hall = halls()
-    hall.tell("left")
-    hall.turn()
-    assert hall.status() == (1, "waiting for the first state of right")
+    arms = make_arms()
+    arms.publish_states("left")
+    arms.run_controller()
+    assert arms.status() == (1, "waiting for the first state of right")
     half = JointState(name=["joint_2"], position=[1.8], velocity=[0.0])
     half.header.stamp.sec = 1
-    hall.controller.hear("/team/right/joint_states", serialize_message(half))
-    hall.turn()
-    assert hall.status() == (1, "waiting for the first state of right")
-    assert not hall.controller.said["/team/joint_commands"]
+    arms.controller.receive("/team/right/joint_states", serialize_message(half))
+    arms.run_controller()
+    assert arms.status() == (1, "waiting for the first state of right")
+    assert not arms.controller.published["/team/joint_commands"]
     half.name, half.position = ["joint_1"], [0.9]
-    hall.controller.hear("/team/right/joint_states", serialize_message(half))
-    hall.turn()
-    assert len(hall.controller.said["/team/joint_commands"]) == 1
+    arms.controller.receive("/team/right/joint_states", serialize_message(half))
+    arms.run_controller()
+    assert len(arms.controller.published["/team/joint_commands"]) == 1
 
 
-def test_without_states_torques_fade_to_gravity(halls: Any) -> None:
+def test_without_states_torques_fade_to_gravity(make_arms: Any) -> None:
     """No torque of a motion stays in force where the states of all robots have stopped."""
-    hall = halls(state_timeout=0.05, transition_time=0.05)
-    hall.simulation.v = np.array([0.3, -0.2, 0.1, 0.4])
+    arms = make_arms(state_timeout=0.05, transition_time=0.05)
+    arms.simulation.v = np.array([0.3, -0.2, 0.1, 0.4])
     for _ in range(20):
-        hall.tell("left", "right")
-        hall.turn()
-        hall.step()
-    told = deserialize_message(hall.controller.said["/team/joint_states"][-1], JointState)
-    gravity = hall.team.gravity(np.array(told.position))
-    left, right = hall.drivers["left"], hall.drivers["right"]
+        arms.publish_states("left", "right")
+        arms.run_controller()
+        arms.step()
+    received = deserialize_message(arms.controller.published["/team/joint_states"][-1], JointState)
+    gravity = arms.team.gravity(np.array(received.position))
+    left, right = arms.drivers["left"], arms.drivers["right"]
     assert left.applied(np.zeros(2)).any()
     assert np.abs(right.applied(gravity[2:]) - gravity[2:]).max() > 1e-3
 
     def faded() -> bool:
-        hall.turn()
+        arms.run_controller()
         left_alone = not left.applied(np.zeros(2)).any()
         return left_alone and np.allclose(right.applied(gravity[2:]), gravity[2:], rtol=1e-12)
 

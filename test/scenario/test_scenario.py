@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenarios: what fits together, and how everything else is refused."""
+"""Scenarios: valid combinations, and errors for all others."""
 
 import copy
 from pathlib import Path
@@ -16,7 +16,7 @@ MISSING = object()
 
 
 def small() -> dict:
-    """A scenario of two point masses with everything that a scenario may have."""
+    """Scenario of two point masses with all optional blocks."""
     return {
         "robots": ["left", "right"],
         "left": {"model": "point_mass", "mass": 1.0},
@@ -59,7 +59,7 @@ def test_scenarios_of_the_package_load(file):
 
 
 def test_a_whole_scenario_builds_all_its_parts():
-    """What a scenario names is there, of the right sizes and in order."""
+    """All named parts are built, with the right sizes and in order."""
     scenario = Scenario.from_dict(small())
     team = scenario.build_team()
     stack = scenario.build_stack(team)
@@ -182,7 +182,7 @@ def test_the_scenario_that_is_changed_above_is_right():
 
 @pytest.mark.parametrize("name", ["robots", "subtasks"])
 def test_robots_and_subtasks_must_be_listed(name):
-    """A scenario without its lists of robots or subtasks says so."""
+    """A scenario without its lists of robots or subtasks is rejected by that key."""
     values = {key: value for key, value in small().items() if key in ("robots", "subtasks")}
     blocks = [block for key, listed in values.items() if key != name for block in listed]
     values = {key: small()[key] for key in [*values, *blocks] if key != name}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Configuration blocks: what they take and how they refuse."""
+"""Configuration blocks: conversion, and errors of invalid values."""
 
 import array
 import math
@@ -27,7 +27,7 @@ class Sample:
 
 
 def test_values_are_converted_and_defaults_fill_the_rest():
-    """Whole numbers become floats, lists become tuples, and what is left out has its default."""
+    """Integers become floats, lists become tuples, and omitted keys have their defaults."""
     sample = load(Sample, {"mass": 2, "gains": [1, 2.5], "names": ["y", "x"]})
     assert sample == Sample(2.0, gains=(1.0, 2.5), names=("y", "x"))
     assert type(sample.mass) is float
@@ -115,8 +115,8 @@ def test_a_missing_key_is_named_with_its_type():
     assert str(caught.value) == "block.mass: found nothing, allowed: a number (required)"
 
 
-def test_keys_of_somebody_else_are_left_alone():
-    """Ignored keys are neither read nor refused."""
+def test_keys_of_other_blocks_are_ignored():
+    """Ignored keys are neither read nor rejected."""
     assert load(Sample, {"mass": 1.0, "other": object()}, ignore=("other",)).mass == 1.0
 
 
@@ -128,7 +128,7 @@ def test_a_long_value_is_cut():
 
 
 def test_a_file_heads_the_message():
-    """Where the file is known the message starts with it."""
+    """A known file starts the message."""
     error = ScenarioError("a.b", 3, "a text", "team.yaml")
     assert str(error) == "team.yaml: a.b: found 3, allowed: a text"
 

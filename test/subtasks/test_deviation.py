@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How far a motion is from where another one led: the short way to `gap` from `ahead`."""
+"""Deviation of a motion from an extrapolated earlier one."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ def motion_of(layout, rng):
 
 @pytest.mark.parametrize("layout", [Layout((3, 2), (True, False)), Layout.scalars(4)])
 @pytest.mark.parametrize("dt", [0.0, 0.01, 0.3])
-def test_deviation_is_the_gap_from_what_lies_ahead(layout, dt):
+def test_deviation_is_the_relative_motion_to_the_extrapolation(layout, dt):
     rng = np.random.default_rng(0)
     before, motion = motion_of(layout, rng), motion_of(layout, rng)
     expected = layout.relative_motion(motion, layout.extrapolate(before, dt))
@@ -22,9 +22,9 @@ def test_deviation_is_the_gap_from_what_lies_ahead(layout, dt):
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-13)
 
 
-def test_rest_stays_and_no_time_changes_nothing():
+def test_extrapolation_of_rest_or_by_no_time_is_the_motion():
     layout = Layout((3,), (True,))
     x, velocity, acceleration = motion_of(layout, np.random.default_rng(1))
-    still = np.zeros(layout.dim)
-    assert layout.extrapolate((x, still, still), 0.5)[0] is x
+    zero = np.zeros(layout.dim)
+    assert layout.extrapolate((x, zero, zero), 0.5)[0] is x
     assert layout.extrapolate((x, velocity, acceleration), 0.0)[1] is velocity

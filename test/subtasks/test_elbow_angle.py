@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Elbow angles: value, differentials, where there is none, and two Pandas that are led by them."""
+"""Elbow angles: value, differentials, singular states, and two Pandas led by them."""
 
 from typing import Any
 
@@ -114,8 +114,8 @@ def test_only_turning_about_the_line_counts() -> None:
     assert np.linalg.norm(along) > 0.3
 
 
-def test_differences_go_the_shorter_way_round() -> None:
-    """Angles on both sides of half a turn are close, and a whole turn is none."""
+def test_differences_are_the_shortest_ones() -> None:
+    """Angles on both sides of half a turn are close, and a full turn is none."""
     task = block().build("elbows", team())
     e = task.difference(np.array([3.1, 0.5]), np.array([-3.1, 0.5 - 4.0 * np.pi]))
     np.testing.assert_allclose(e, [6.2 - 2.0 * np.pi, 0.0], atol=1e-14)
@@ -127,23 +127,23 @@ def test_differences_go_the_shorter_way_round() -> None:
     np.testing.assert_allclose(e[[0, -2, -1]], [7.0, 6.2 - 2.0 * np.pi, -0.5], atol=1e-14)
 
 
-def unsound(robots: Team, q: np.ndarray, **keys: Any) -> float:
+def singularity_distance(robots: Team, q: np.ndarray, **keys: Any) -> float:
     return (
         block(**keys).build("elbows", robots).singularity_distance(robots.state(q, np.zeros(14)))
     )
 
 
-def test_where_there_is_no_angle_soundness_is_zero_and_nothing_is_infinite() -> None:
-    """A line along the reference, and points in one line, are told of in time."""
+def test_singularity_distance_is_zero_without_an_angle_and_all_terms_stay_finite() -> None:
+    """A line along the reference, and points in one line, are detected."""
     robots = team()
     shoulder, _, wrist = points(robots, robots.q0, "panda_1")
     along = tuple(wrist - shoulder)
-    assert unsound(robots, robots.q0) > 0.5
-    assert unsound(robots, robots.q0, reference=along) < 1e-8
+    assert singularity_distance(robots, robots.q0) > 0.5
+    assert singularity_distance(robots, robots.q0, reference=along) < 1e-8
     straight = {"elbow": ("panda_link3",), "wrist": ("panda_link3",)}
     for keys in ({"reference": along}, straight, {"wrist": ("panda_link2",)}):
         task = block(**keys).build("elbows", robots)
-        assert unsound(robots, robots.q0, **keys) < 1e-8
+        assert singularity_distance(robots, robots.q0, **keys) < 1e-8
         found = task.evaluate(robots.state(robots.q0, np.ones(14)))
         for term in (found.x, found.J, found.J_rate):
             assert np.isfinite(term).all()

@@ -19,7 +19,7 @@ def random_value(layout: Layout, rng) -> np.ndarray:
 
 
 def test_a_rotation_is_four_numbers_of_a_value_and_three_of_a_velocity():
-    """Places run element after element, plain numbers first."""
+    """Indices run element by element, scalars first."""
     assert (MIXED.size, MIXED.dim) == (3 + 4 + 4 + 2 + 1 + 4, 3 + 3 + 3 + 2 + 1 + 3)
     assert MIXED.values.tolist() == [0, 1, 2, 11, 12, 13]
     assert MIXED.rates.tolist() == [0, 1, 2, 9, 10, 11]
@@ -30,8 +30,8 @@ def test_a_rotation_is_four_numbers_of_a_value_and_three_of_a_velocity():
     np.testing.assert_array_equal(joined.rates, MIXED.rates)
 
 
-def test_plain_numbers_are_reckoned_with_as_ever():
-    """Without rotations every operation is the plain one, to the bit."""
+def test_scalars_have_plain_arithmetic():
+    """Without rotations every operation is the elementary one, to the bit."""
     layout, rng = Layout.scalars(5), np.random.default_rng(0)
     a, b = ([rng.normal(size=5) for _ in range(3)] for _ in range(2))
     assert not layout.rotates
@@ -64,8 +64,8 @@ def test_the_sign_of_a_quaternion_means_nothing():
     np.testing.assert_allclose(MIXED.difference(x_d, other), MIXED.difference(x_d, x), rtol=1e-15)
 
 
-def test_half_a_turn_is_as_far_as_it_gets():
-    """Opposite rotations differ by pi about the axis; a little further it is the other way."""
+def test_the_largest_difference_is_half_a_turn():
+    """Opposite rotations differ by pi; beyond, the opposite direction is shorter."""
     layout, axis = Layout((0,), (True,)), np.array([0.6, 0.0, 0.8])
     for over in (-1e-9, 1e-9, 0.3):
         e = layout.difference(so3.exp((np.pi + over) * axis), layout.identity)
@@ -104,8 +104,8 @@ def test_composed_motions_have_exact_derivatives():
             np.testing.assert_allclose(acceleration, expected[1], atol=1e-6)
 
 
-def test_gaps_have_exact_derivatives_and_lead_back():
-    """The gap between two motions moves with its rates, and added again gives the motion."""
+def test_relative_motions_have_exact_derivatives_and_compose_back():
+    """The difference of two motions has the stated rates, and composes back to the motion."""
     for seed in range(5):
         one, other = path(MIXED, seed), path(MIXED, seed + 50)
         gap = MIXED.relative_motion(one(0.4), other(0.4))
@@ -119,7 +119,7 @@ def test_gaps_have_exact_derivatives_and_lead_back():
 
 
 def test_extrapolation_has_exact_derivatives_and_the_right_start():
-    """Ahead by nothing it is the motion itself; ahead by dt its rates are those of its path."""
+    """At dt = 0 it is the motion itself; at dt its rates are those of its path."""
     motion = path(MIXED, 7)(0.3)
     for found, expected in zip(MIXED.extrapolate(motion, 0.0)[1:], motion[1:], strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-14, atol=1e-15)
@@ -138,8 +138,8 @@ def test_a_steady_turn_goes_on_for_good():
     assert np.linalg.norm(x) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_quaternions_are_checked_and_brought_to_unit_length():
-    """A little off is put right, more is refused; plain numbers pass as they are."""
+def test_quaternions_are_checked_and_normalised():
+    """Small errors are corrected, larger ones rejected; scalars pass unchanged."""
     layout = Layout((1,), (True,))
     found = layout.checked(np.array([7.0, 0.0, 0.0, 0.0, 1.0005]))
     np.testing.assert_array_equal(found, [7.0, 0.0, 0.0, 0.0, 1.0])
@@ -148,7 +148,7 @@ def test_quaternions_are_checked_and_brought_to_unit_length():
 
 
 def test_unit_quaternions_pass_a_check_to_the_bit():
-    """Otherwise a message would not carry what was sent."""
+    """Otherwise a message would not carry the sent value."""
     layout = Layout((0,), (True,))
     for phi in np.random.default_rng(2).normal(size=(200, 3)):
         q = layout.sum(layout.identity, phi)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses of teams of spatial arms: values, exact differentials, frames, and what is refused."""
+"""Poses of teams of spatial arms: values, exact differentials, frames, and rejected settings."""
 
 from dataclasses import replace
 
@@ -153,7 +153,7 @@ def turned(state: TeamState, R: np.ndarray) -> TeamState:
 
 @pytest.mark.parametrize("count", [2, 3])
 def test_a_team_that_turns_as_one_body_keeps_its_grasp(count):
-    """Seen from the cooperative frame nothing changes; the cooperative orientation turns along."""
+    """In the cooperative frame nothing changes; the cooperative orientation turns along."""
     team = spatial_team(count)
     state = random_state(team, np.random.default_rng(3))
     R = Rotation.from_rotvec([0.9, -1.4, 0.4])
@@ -174,7 +174,7 @@ def test_a_team_that_turns_as_one_body_keeps_its_grasp(count):
 
 
 def test_relative_rotation_leads_from_the_second_to_the_first():
-    """In the world R_a = E R_b; from the frame the same as the frame sees it."""
+    """In the world R_a = E R_b; in the frame, the same in its axes."""
     team = spatial_team(2)
     state = random_state(team, np.random.default_rng(4))
     a, b = Rotation.from_matrix(state.tool_rotations)
@@ -203,7 +203,7 @@ def opposite() -> Team:
 
 
 def test_tools_that_face_each_other_need_another_alignment():
-    """Half a turn apart there is no midpoint: refused with the way out, which then works."""
+    """Half a turn apart there is no midpoint: the error names `start`, which then works."""
     team = opposite()
     with pytest.raises(ScenarioError, match=r"task\.alignment: found 'tools', with tools 89 deg"):
         lead().build("task", team)
@@ -318,7 +318,7 @@ def test_what_does_not_fit_the_team_is_refused(block, key, words):
 
 
 def test_values_have_unit_quaternions():
-    """Whatever the state, x is a value of its layout."""
+    """At any state, x is a value of its layout."""
     team = spatial_team(3)
     task = built(grasp(frame="lead"), team)
     for seed in range(5):

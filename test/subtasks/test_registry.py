@@ -51,7 +51,7 @@ def test_a_scenario_can_name_a_user_s_own_kind(by_path, kinds):
 
 
 def test_a_name_can_be_registered_again_but_not_taken(kinds):
-    """The same class twice is fine; another class under the name is refused."""
+    """A class may be registered twice; another class under its name is rejected."""
     register_kind("distance", Distance)
     register_kind("distance", Distance)
     with pytest.raises(ScenarioError, match="kind: found 'relative_pose', allowed: none of"):

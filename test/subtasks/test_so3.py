@@ -41,7 +41,7 @@ def test_quaternions_are_scipy_s():
 
 
 def test_log_undoes_exp_for_either_sign():
-    """Up to half a turn the rotation vector comes back, whatever the sign of the quaternion."""
+    """Up to half a turn the rotation vector comes back, for both signs of the quaternion."""
     for sign in (1.0, -1.0):
         back = so3.log(sign * so3.exp(PHI))
         np.testing.assert_allclose(back, PHI, rtol=1e-13, atol=1e-15)
@@ -109,7 +109,7 @@ def test_rates_are_derivatives(value, rate):
 
 
 def test_series_and_closed_forms_meet():
-    """Where the series ends nothing jumps by more than rounding."""
+    """At the end of the series nothing jumps by more than rounding."""
     ends = [(1.0 + h) * AXES for h in (-1e-15, 1e-15)]
     for function in (so3.jacobian, so3.inverse_jacobian):
         np.testing.assert_allclose(function(ends[0]), function(ends[1]), atol=3e-15)

@@ -77,7 +77,7 @@ def test_too_many_coordinates_are_counted():
 
 
 def test_edges_in_a_loop_are_found_by_rank():
-    """Assumption 3: three edges round a loop leave the fourth robot free; the rank tells."""
+    """Assumption 3: three edges in a loop leave the fourth robot free, which the rank shows."""
     robots = team(4)
     loop = relative(robots, edges=("r1", "r2", "r2", "r3", "r3", "r1"))
     with pytest.raises(SubtaskError) as caught:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""States told at different times, made into one: exact together, bounded apart."""
+"""States of different stamps, assembled to one: exact for equal stamps, bounded otherwise."""
 
 from dataclasses import dataclass
 
@@ -36,7 +36,7 @@ MOTION = Motion(
 )
 
 
-def tell(assembler: StateAssembler, joints: np.ndarray, stamp: int) -> None:
+def update(assembler: StateAssembler, joints: np.ndarray, stamp: int) -> None:
     assembler.update(joints, stamp, MOTION.at(stamp, 0)[joints], MOTION.at(stamp, 1)[joints])
 
 
@@ -46,11 +46,11 @@ def worst(prediction: str, offset_ns: int) -> tuple[np.ndarray, np.ndarray]:
     errors = []
     for tick in range(2000):
         stamp = tick * MILLISECOND
-        tell(assembler, RIGHT, stamp)
+        update(assembler, RIGHT, stamp)
         if tick < 5:  # So that accelerations are known.
-            tell(assembler, LEFT, stamp)
+            update(assembler, LEFT, stamp)
             continue
-        tell(assembler, LEFT, stamp + offset_ns)
+        update(assembler, LEFT, stamp + offset_ns)
         state = assembler.assemble()
         assert state.stamp_ns == stamp + offset_ns
         assert not state.late.any()
@@ -63,11 +63,11 @@ def worst(prediction: str, offset_ns: int) -> tuple[np.ndarray, np.ndarray]:
 
 @pytest.mark.parametrize("prediction", ["velocity", "acceleration"])
 def test_equal_stamps_change_nothing(prediction: str) -> None:
-    """Told of the same time, the state is what was told, to the bit."""
+    """With equal stamps the assembled state is the received one, to the bit."""
     assembler = StateAssembler(NAMES, prediction, 0.02)
     for tick in range(50):
-        tell(assembler, RIGHT, tick * MILLISECOND)
-        tell(assembler, LEFT, tick * MILLISECOND)
+        update(assembler, RIGHT, tick * MILLISECOND)
+        update(assembler, LEFT, tick * MILLISECOND)
         assert assembler.simultaneous
         state = assembler.assemble()
         np.testing.assert_array_equal(state.position, MOTION.at(tick * MILLISECOND, 0))
@@ -100,40 +100,40 @@ def test_measured_acceleration_errs_one_order_less(offset_ms: float) -> None:
     assert (velocity[RIGHT] >= 0.8 * j * (d**2 + h * d) / 2.0).all()
 
 
-def test_a_state_told_again_keeps_the_acceleration() -> None:
-    """A repeated message, as after a lost answer, is no news."""
+def test_a_repeated_state_keeps_the_acceleration() -> None:
+    """A repeated message, as after a lost response, carries no new information."""
     assembler = StateAssembler(NAMES, "acceleration", 0.02)
     for tick in (0, 1, 1):
-        tell(assembler, RIGHT, tick * MILLISECOND)
-    tell(assembler, LEFT, 3 * MILLISECOND)
+        update(assembler, RIGHT, tick * MILLISECOND)
+    update(assembler, LEFT, 3 * MILLISECOND)
     state = assembler.assemble()
     expected = MOTION.at(3 * MILLISECOND, 1)
     assert (np.abs(state.velocity - expected)[RIGHT] < 0.1 * MOTION.largest(2)[RIGHT] * 2e-3).all()
 
 
 def test_a_late_robot_rests_where_it_was() -> None:
-    """Beyond the bound nothing is guessed: last position, no velocity; the others go on."""
+    """Beyond the bound there is no prediction: last position, no velocity; the others go on."""
     assembler = StateAssembler(NAMES, "velocity", 0.02)
-    tell(assembler, RIGHT, 0)
-    tell(assembler, LEFT, 20 * MILLISECOND)
+    update(assembler, RIGHT, 0)
+    update(assembler, LEFT, 20 * MILLISECOND)
     assert not assembler.assemble().late.any()
-    tell(assembler, LEFT, 21 * MILLISECOND)
+    update(assembler, LEFT, 21 * MILLISECOND)
     state = assembler.assemble()
     np.testing.assert_array_equal(state.late, [False, False, True, True])
     np.testing.assert_array_equal(state.position[RIGHT], MOTION.at(0, 0)[RIGHT])
     assert not state.velocity[RIGHT].any()
     np.testing.assert_array_equal(state.velocity[LEFT], MOTION.at(21 * MILLISECOND, 1)[LEFT])
-    tell(assembler, RIGHT, 21 * MILLISECOND)
+    update(assembler, RIGHT, 21 * MILLISECOND)
     assert not assembler.assemble().late.any()
 
 
-def test_joints_may_be_told_of_one_by_one() -> None:
-    """A message may hold some joints only; nothing is told before every joint is known."""
+def test_joints_may_arrive_one_by_one() -> None:
+    """A message may hold some joints only; there is no state before every joint is known."""
     assembler = StateAssembler(NAMES, "velocity", 0.02)
     for joint in range(4):
         assert not assembler.ready
         assert assembler.missing == NAMES[joint:]
-        tell(assembler, np.array([joint]), joint * MILLISECOND // 4)
+        update(assembler, np.array([joint]), joint * MILLISECOND // 4)
     assert assembler.ready
     assert not assembler.simultaneous
     state = assembler.assemble()
@@ -144,10 +144,10 @@ def test_joints_may_be_told_of_one_by_one() -> None:
     assert not assembler.ready
 
 
-def test_efforts_are_those_that_were_measured() -> None:
-    """Where none came, or NaN, there is NaN."""
+def test_efforts_are_the_measured_ones() -> None:
+    """Efforts are NaN where none was received, or NaN."""
     assembler = StateAssembler(NAMES, "velocity", 0.02)
-    tell(assembler, LEFT, 0)
+    update(assembler, LEFT, 0)
     nothing = np.zeros(2)
     assembler.update(RIGHT, 0, nothing, nothing, np.array([3.0, np.nan]))
     np.testing.assert_array_equal(assembler.assemble().effort, [np.nan, np.nan, 3.0, np.nan])

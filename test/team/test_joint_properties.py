@@ -26,7 +26,7 @@ SUBTASKS = {
 
 
 def scenario(one: dict, other: dict, **keys) -> Scenario:
-    """Two robots and what leads them."""
+    """Scenario of two robots and their subtasks."""
     values = {"robots": ["one", "other"], "one": one, "other": other, "rate": RATE}
     return Scenario.from_dict(values | SUBTASKS | keys)
 
@@ -161,7 +161,7 @@ def test_all_of_pinocchio_agrees_on_the_armature():
 
 
 def test_appending_a_model_keeps_armature_and_damping():
-    """Whatever Pinocchio forgets when it appends, both parts have it afterwards."""
+    """Both parts keep armature and damping, which Pinocchio's appendModel drops."""
     one, other = arm("a", armature=[0.3], friction=[0.1, 0.2]), mass("m", armature=[0.5])
     other.model.frames[other.model.nframes - 1].name = "end"
     joined = append_model(one.model, other.model, pin.SE3.Identity())
@@ -207,7 +207,7 @@ def test_friction_and_brake_add_up():
 
 
 def test_friction_takes_its_power_from_the_energy():
-    """What a coupled arm loses is the integral of v' d v, by Simpson's rule over the ticks."""
+    """The energy loss of a coupled arm is the integral of v' d v, by Simpson's rule."""
     friction = np.array([0.4, 0.2, 0.0, 0.3])
     plant = simulation(
         ARM | {"friction": [0.4, 0.2], "plane": "xz"},
@@ -250,7 +250,7 @@ def test_continuous_joints_have_one_angle_each():
 
 
 def test_any_angle_comes_in_and_a_wrapped_one_goes_out():
-    """Whole turns make no difference, and half a turn is +pi, never -pi."""
+    """Full turns make no difference, and half a turn is +pi, never -pi."""
     team = turning_team()
     for angle, wrapped in [
         (0.5 + 6 * np.pi, 0.5),
@@ -291,8 +291,8 @@ def test_difference_takes_the_shortest_way_over_the_wrap():
     np.testing.assert_allclose(team.integrate(start, way), end, atol=1e-14)
 
 
-def test_dynamics_do_not_care_how_often_a_joint_has_turned():
-    """M, C, g and tools are the same whole turns away, and derivatives hold across the wrap."""
+def test_dynamics_do_not_depend_on_full_turns():
+    """M, C, g and tools are the same full turns away, and derivatives hold across the wrap."""
     team = turning_team()
     rng = np.random.default_rng(4)
     positions, v = rng.normal(size=8), rng.normal(size=8)

@@ -87,7 +87,7 @@ def test_dynamics_and_kinematics_are_those_on_paper(location, plane):
 
 
 def test_the_arms_of_the_derivations_can_be_made():
-    """Links of 0.5 m with masses at their tips are the arms that the derivations speak of."""
+    """Links of 0.5 m with masses at their tips are the arms of the derivations."""
     closed = PlanarArms()
     keys = {"link_lengths": [0.5, 0.5], "mass_location": "tip"}
     arms = [

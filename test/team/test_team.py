@@ -13,7 +13,7 @@ STEP = 1e-6
 
 
 def masses() -> Team:
-    """Point masses of one, two and three axes with unlike masses."""
+    """Point masses of one, two and three axes with different masses."""
     return Team(
         [
             PointMass(1.0, axes=("z",)).build("a"),
@@ -24,7 +24,7 @@ def masses() -> Team:
 
 
 def arms() -> Team:
-    """Two unlike spatial arms of three joints, with all effects of Coriolis and gravity."""
+    """Two different spatial arms of three joints, with Coriolis and gravity terms."""
     return Team(
         [
             arm("left", 1.0, 0.7, 0.5, axes="zyz", start=(0.1, 0.2, 0.3)),
@@ -76,8 +76,8 @@ def test_inertia_rate_minus_twice_coriolis_is_skew(build):
     np.testing.assert_allclose(skew, -skew.T, atol=1e-8)
 
 
-def test_the_arms_have_velocity_forces_to_speak_of():
-    """The skewness above is no accident of a Coriolis matrix that is zero."""
+def test_the_arms_have_coriolis_forces():
+    """The skewness above is not that of a zero Coriolis matrix."""
     team = arms()
     assert np.abs(team.state(*random_state(team)).C).max() > 0.1
 
@@ -99,7 +99,7 @@ def test_gravity_is_the_gradient_of_the_potential_energy(build):
     np.testing.assert_allclose(team.gravity(q), gradient, atol=1e-7)
 
 
-def test_gravity_acts_as_the_scenario_says():
+def test_gravity_has_the_direction_of_the_scenario():
     """Gravity pulls each mass along its own axes with its weight."""
     robots = [PointMass(2.0, axes=("z", "x")).build("a"), PointMass(3.0).build("b")]
     state = Team(robots, (1.0, 0.0, -9.0)).state(np.zeros(4), np.zeros(4))

@@ -128,7 +128,7 @@ def test_names_are_prefixed_by_the_robot():
 
 
 def test_two_robots_of_one_urdf_differ_by_name_and_base():
-    """The same URDF twice is no conflict, and the second tool is where its base puts it."""
+    """Two robots of one URDF do not conflict, and the second tool is at its own base."""
     turned = [0.8, 0.0, 0.1, 0.0, 0.0, 1.0, 0.0]  # half a turn about z
     team = Team([panda("left"), panda("right", base_pose=turned)])
     points = team.state(team.q0, np.zeros(team.n)).tool_positions
@@ -196,7 +196,7 @@ def test_limits_come_from_the_urdf_unless_given():
 
 
 def test_an_effort_or_speed_of_zero_in_the_urdf_is_no_limit():
-    """Many files leave zero there; a joint that can do nothing is not meant."""
+    """Many files have zero there, which does not mean a joint without torque."""
     text = planar().replace('effort="30" velocity="4"', 'effort="0" velocity="0"')
     robot = build(urdf_text=text)
     assert np.isinf(robot.effort_limits).all()
@@ -204,7 +204,7 @@ def test_an_effort_or_speed_of_zero_in_the_urdf_is_no_limit():
 
 
 def test_damping_in_the_urdf_is_not_used():
-    """Friction is what the scenario says, and none by default."""
+    """Friction is that of the scenario, and none by default."""
     damped = planar(inside='<dynamics damping="3" friction="1"/>')
     np.testing.assert_array_equal(build(urdf_text=damped).model.damping, [0.0, 0.0])
     np.testing.assert_array_equal(
@@ -399,7 +399,7 @@ def test_a_mimicking_joint_may_be_locked():
 
 
 def test_missing_files_are_named_with_where_they_could_be(tmp_path, monkeypatch):
-    """A missing file, package or robot says what was looked for, and where or what there is."""
+    """A missing file, package or robot is reported with the searched places or known names."""
     monkeypatch.chdir(tmp_path)
     error = refused(urdf="nothing.urdf")
     assert error.key == "arm.urdf"

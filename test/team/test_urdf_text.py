@@ -53,14 +53,14 @@ def test_the_same_robot_is_read_back(name: str) -> None:
 
 
 def test_every_link_with_mass_can_be_seen() -> None:
-    """A rod and a ball a link; a point mass is one ball."""
+    """Each link has a rod and a sphere; a point mass is one sphere."""
     assert BLOCKS["rods"].description("arm").count("<visual>") == 6
     assert BLOCKS["ball"].description("ball").count("<sphere") == 1
     assert BLOCKS["ball"].description("ball").count("<cylinder") == 0
 
 
-def test_a_given_urdf_is_told_as_it_was_given() -> None:
-    """Not a byte is changed, so that whoever has it can see that it is the same."""
+def test_a_given_urdf_is_returned_unchanged() -> None:
+    """Not a byte is changed, so that a reader can compare it."""
     text = BLOCKS["rods"].description("arm")
     block = load(UrdfRobot, {"urdf_text": text, "tool_frame": "tool"})
     assert block.description("other name") == text
