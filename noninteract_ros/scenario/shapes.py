@@ -18,7 +18,7 @@ from noninteract_ros.simulation.environment import Door, RigidObject
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.team.geometry import hulls
 from noninteract_ros.team.geometry.hulls import Hull
-from noninteract_ros.team.geometry.links import sticks, urdf_shapes
+from noninteract_ros.team.geometry.links import link_capsules, urdf_shapes
 from noninteract_ros.team.geometry.obstacles import Obstacle
 from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.models.urdf_robot import UrdfRobot
@@ -63,7 +63,7 @@ def shapes_of(
         parts = _point_mass(block, scenario, radius) if isinstance(block, PointMass) else []
         if isinstance(block, UrdfRobot):
             parts = list(_collision_geometry(block, robot))
-        for joint, hull in parts or sticks(robot):
+        for joint, hull in parts or link_capsules(robot):
             found.append(Shape(*_in_plant(plant, robot, joint, hull), number))
     found += [
         Shape(joint, hull, NO_ROBOT)

@@ -22,7 +22,7 @@ STEP = 1e-5
 
 
 def bodies_of(team: Team, around: Sequence[Body] = ()) -> list[Body]:
-    """Links of all robots as sticks, and bodies around them."""
+    """Links of all robots as capsules, and bodies around them."""
     return [body for robot in team.robots for body in link_bodies(robot, [], team)] + list(around)
 
 

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes of robots and surroundings."""
+"""Collision bodies and hulls of robots and surroundings, and the distances between them."""

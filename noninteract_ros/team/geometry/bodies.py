@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Bodies that can collide: links of robots, held objects, surroundings."""
+"""Collision bodies: links of robots, held objects, surroundings."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,23 +13,23 @@ from scipy.spatial import ConvexHull
 from noninteract_ros.arrays import Array
 from noninteract_ros.team.geometry.fitting import Capsule, capsule_around
 from noninteract_ros.team.geometry.hulls import geometry_hull
-from noninteract_ros.team.geometry.links import LinkShape, segments, stick_radius
+from noninteract_ros.team.geometry.links import LinkShape, default_link_radius, segments
 from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.team import Team
 
 
 @dataclass(frozen=True)
 class Body:
-    """A body fixed to a joint.
+    """Collision body fixed to a joint.
 
     Attributes:
-        name: Its name, `<owner>/<link>` or that of a surrounding.
-        owner: Robot or surrounding that it belongs to.
-        joint: Joint that carries it in the team's model; 0 is the world.
-        capsule: The body itself or, of a convex one, a capsule around it; for a plane, a point of
+        name: Name of the body, `<owner>/<link>` or that of a surrounding.
+        owner: Robot or surrounding of the body.
+        joint: Joint of the body in the team's model; 0 is the world.
+        capsule: Shape of the body, or a capsule around it if it is convex; for a plane, a point of
             it and the point one normal above.
-        convex: Geometry of coal in the joint's frame; None for a capsule and for a plane.
-        plane: True for a half-space, which belongs to the world.
+        convex: Convex coal geometry in the joint's frame; None for a capsule and for a plane.
+        plane: True for a half-space, which is fixed to the world.
         touches: Joints whose bodies it touches by design, such as those of grippers.
     """
 
@@ -43,7 +43,7 @@ class Body:
 
 
 def convex_body(points: Array) -> Any:
-    """Convex geometry of coal around points, shape (m, 3) [m]."""
+    """Return the convex coal geometry around points, shape (m, 3) [m]."""
     corners = coal.StdVec_Vec3s()
     for point in points:
         corners.append(point)
@@ -53,12 +53,12 @@ def convex_body(points: Array) -> Any:
 def link_bodies(
     robot: Robot, shapes: Sequence[LinkShape], team: Team, exact: bool = False
 ) -> list[Body]:
-    """Bodies of a robot's links, one per link.
+    """Return the bodies of a robot's links, one per link.
 
     Args:
         robot: The robot.
-        shapes: Collision geometry of its links; without any, links are sticks.
-        team: The team, whose joints carry the bodies.
+        shapes: Collision geometry of the links; if empty, links are capsules between joints.
+        team: Team whose joints the bodies are fixed to.
         exact: True for convex hulls, False for capsules around them.
     """
     found: dict[tuple[str, int], list[Array]] = {}
@@ -73,16 +73,17 @@ def link_bodies(
         points = points[ConvexHull(points).vertices]
         convex = convex_body(points) if exact else None
         bodies.append(_placed(robot, team, link, joint, capsule_around(points), convex))
-    return bodies or _stick_bodies(robot, team)
+    return bodies or _default_bodies(robot, team)
 
 
-def _stick_bodies(robot: Robot, team: Team) -> list[Body]:
+def _default_bodies(robot: Robot, team: Team) -> list[Body]:
+    """Return the bodies of a robot without collision geometry."""
     ends = segments(robot)
     moving = [item for item in ends if item[0] > 0]
     if not any(end.any() for _, end in moving):  # A point mass.
         tool = Capsule(np.zeros(3), np.zeros(3), 0.0)
         return [_placed(robot, team, robot.tool_frame, ends[-1][0], tool, None)]
-    radius = stick_radius(ends)
+    radius = default_link_radius(ends)
     return [
         _placed(robot, team, f"link_{joint}", joint, Capsule(np.zeros(3), end, radius), None)
         for joint, end in moving
@@ -93,7 +94,7 @@ def _stick_bodies(robot: Robot, team: Team) -> list[Body]:
 def _placed(
     robot: Robot, team: Team, link: str, joint: int, capsule: Capsule, convex: Any
 ) -> Body:
-    """A body on a joint of the robot's own model, as one on a joint of the team's."""
+    """Convert a body on a joint of the robot's own model to one on a joint of the team's."""
     body = Body(f"{robot.name}/{link}", robot.name, joint, capsule, convex)
     if joint == 0:
         return moved(body, robot.base_pose, 0)
@@ -102,7 +103,7 @@ def _placed(
 
 
 def moved(body: Body, pose: pin.SE3, joint: int) -> Body:
-    """The same body on another joint, in whose frame the body's old frame has a pose."""
+    """Return a body fixed to another joint, given the pose of its old frame in the new joint's."""
     capsule = Capsule(
         pose.act(body.capsule.start), pose.act(body.capsule.end), body.capsule.radius
     )

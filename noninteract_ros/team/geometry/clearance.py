@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Distances between all bodies of a team and around it, with their derivatives."""
+"""Distances between all bodies of a team and its surroundings, with their derivatives."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -16,22 +16,23 @@ from noninteract_ros.team.geometry.kernels.kinematics import Indices, Motion, Tr
 from noninteract_ros.team.geometry.pairs import find_pairs
 from noninteract_ros.team.team import PRISMATIC, Team
 
-AHEAD = 1e-3  # [s] over which the rate of a distance between convex bodies is differenced
+AHEAD = 1e-3  # [s] step of finite differences for rates between convex bodies
 
 
 @dataclass(frozen=True, slots=True)
 class Clearances:
-    """Pairs of bodies that are near each other; ddot d = row a + drift for an acceleration a.
+    """Pairs of close bodies; ddot d = row a + drift for a joint acceleration a.
 
     Attributes:
-        pairs: Numbers of the pairs, shape (k,).
-        distances: Shape (k,) [m]; negative where capsules overlap.
+        pairs: Indices of the pairs, shape (k,).
+        distances: Distances, shape (k,) [m]; negative for overlapping capsules.
         points: Nearest points of both bodies in the world, shape (k, 2, 3) [m].
-        normals: Directions from the first to the second, shape (k, 3).
+        normals: Directions from the first to the second body, shape (k, 3).
         rows: Jacobian of the distances, shape (k, n).
-        rates: rows v, shape (k,) [m/s].
+        rates: Rates of the distances, rows v, shape (k,) [m/s].
         drifts: d(rows)/dt v, shape (k,) [m/s^2].
-        least: Smallest distance of all pairs [m], a lower bound beyond the reach; inf without any.
+        least: Smallest distance of all pairs [m], a lower bound beyond the reach; inf without
+            pairs.
     """
 
     pairs: Indices
@@ -45,15 +46,15 @@ class Clearances:
 
 
 class CollisionGeometry:
-    """Bodies of a team and of what is around it, made once.
+    """Bodies of a team and its surroundings, and the pairs of them that can collide.
 
     Args:
         team: The robots.
-        bodies: Their links, what they hold, and the surroundings.
+        bodies: Links, held objects and surroundings.
 
     Attributes:
         bodies: The bodies.
-        pairs: Pairs that are watched, and those that are left out.
+        pairs: Monitored pairs, and excluded ones.
     """
 
     def __init__(self, team: Team, bodies: Sequence[Body]) -> None:
@@ -66,17 +67,17 @@ class CollisionGeometry:
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
 
     def name(self, pair: int) -> str:
-        """Names of the two bodies of a pair."""
+        """Return the names of the two bodies of a pair."""
         first, second = self.pairs.watched[pair]
         return f"{self.bodies[first].name} - {self.bodies[second].name}"
 
     def evaluate(self, q: Array, v: Array, reach: float = np.inf) -> Clearances:
-        """Clearances of the pairs that are nearer than a reach [m].
+        """Return the clearances of all pairs closer than `reach`.
 
         Args:
             q: Configuration, shape (nq,).
             v: Velocity, shape (n,).
-            reach: Distance from which on a pair is left out [m].
+            reach: Distance beyond which a pair is omitted [m].
         """
         positions = np.ascontiguousarray(self.team.joints_from_configuration(q))
         watched, kinds = self.pairs.watched, self.pairs.kinds
@@ -84,7 +85,7 @@ class CollisionGeometry:
             self._tree, self._capsules, watched, kinds, positions, v, reach
         )
         if len(self._convex):
-            # So far the distances of convex bodies are those of capsules around them.
+            # Distances of convex bodies are those of the capsules around them so far.
             chosen, near = self._refined(motion, found, chosen, near, reach)
         least = float(found.min()) if len(found) else np.inf
         return Clearances(chosen, found[chosen], *near, least)
@@ -92,7 +93,7 @@ class CollisionGeometry:
     def _refined(
         self, motion: Motion, found: Array, chosen: Indices, near: Near, reach: float
     ) -> tuple[Indices, Near]:
-        """Pairs and terms with convex bodies measured; fills in their distances."""
+        """Compute distances and terms of convex bodies; return the remaining pairs and terms."""
         convex = np.flatnonzero(self.pairs.kinds[chosen] == CONVEX)
         now = np.empty((len(convex), 3, 3))
         for k, place in enumerate(convex):
@@ -113,7 +114,7 @@ class CollisionGeometry:
         return chosen, near
 
     def _between(self, motion: Motion, pair: int, ahead: float, out: Array) -> float:
-        """Distance of a convex pair by coal, some seconds ahead; fills normal and points."""
+        """Return a convex pair's distance `ahead` [s] from now; write normal and points."""
         i, j = self.pairs.watched[pair]
         result = self._result
         result.clear()
@@ -147,7 +148,7 @@ class CollisionGeometry:
 
 
 def _tree(team: Team) -> Tree:
-    """The team's joints as arrays."""
+    """Return the team's joints as arrays."""
     model = team.model
     data, count = model.createData(), model.njoints
     pin.computeJointJacobians(model, data, team.q0)
@@ -179,7 +180,7 @@ def _capsules(bodies: Sequence[Body]) -> Capsules:
 
 
 def _coal_shape(body: Body) -> tuple[object, pin.SE3 | None]:
-    """Geometry of coal and its placement in the joint's frame; None for none."""
+    """Return the coal geometry of a body and its placement in the joint's frame, or None."""
     if body.convex is not None:
         return body.convex, None
     capsule = body.capsule

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Capsules around convex bodies."""
+"""Fitting of capsules around convex bodies."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -12,11 +12,11 @@ from noninteract_ros.arrays import Array
 
 @dataclass(frozen=True)
 class Capsule:
-    """All points within a radius of a segment.
+    """Set of all points within a radius of a segment.
 
     Attributes:
-        start: Shape (3,) [m].
-        end: Shape (3,) [m].
+        start: Start of the segment, shape (3,) [m].
+        end: End of the segment, shape (3,) [m].
         radius: Radius [m].
     """
 
@@ -32,12 +32,12 @@ class Capsule:
 
 
 def capsule_around(points: Array) -> Capsule:
-    """Return a small capsule that holds points, shape (m, 3) [m].
+    """Return a small capsule that contains points, shape (m, 3) [m].
 
-    The direction and the middle line are searched from the principal axes; the capsule holds all
-    points whatever the search finds.
+    Direction and centre line are optimised from the principal axes. The capsule contains all
+    points, whether or not the optimisation converges.
     """
-    return _fitted(points.tobytes())  # Robots of a kind have the same links.
+    return _fitted(points.tobytes())  # Robots of one model have the same links.
 
 
 @cache
@@ -75,6 +75,6 @@ def _built(points: Array, centre: Array, frame: Array, x: Array) -> Capsule:
     radius = float(across.max())
     inside = np.sqrt(np.maximum(radius**2 - across**2, 0.0))
     low, high = float((along + inside).min()), float((along - inside).max())
-    if low > high:  # The ends may be anywhere between: a ball.
+    if low > high:  # Both ends coincide: a sphere.
         low = high = 0.5 * (low + high)
     return Capsule(base + low * axis, base + high * axis, radius)

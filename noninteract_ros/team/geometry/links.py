@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Shapes of a robot's links: those of its URDF, or sticks from joint to joint."""
+"""Shapes of a robot's links: those of its URDF, or capsules from joint to joint."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,18 +14,18 @@ from noninteract_ros.team.geometry.hulls import Hull
 from noninteract_ros.team.models.urdf_files import share_folders
 from noninteract_ros.team.robot import Robot
 
-STICK = 0.07  # radius of a link without geometry, as a share of the longest link
+LINK_RADIUS = 0.07  # of a link without geometry, as a share of the longest link
 
 
 @dataclass(frozen=True)
 class LinkShape:
-    """A collision geometry of a link.
+    """Collision geometry of a link.
 
     Attributes:
         link: Name of the link.
-        joint: Joint of the robot's own model that carries it; 0 is the base.
-        geometry: Geometry of coal.
-        placement: Its pose in the joint's frame.
+        joint: Joint of the robot's own model that the link is fixed to; 0 is the base.
+        geometry: Coal geometry.
+        placement: Pose in the joint's frame.
     """
 
     link: str
@@ -35,11 +35,11 @@ class LinkShape:
 
 
 def urdf_shapes(urdf: str, robot: Robot) -> Iterator[LinkShape]:
-    """Collision geometry of a URDF on the joints of a robot's own model.
+    """Iterate over the collision geometry of a URDF, on the joints of a robot's own model.
 
     Args:
         urdf: Text of the URDF.
-        robot: The robot, maybe with locked joints.
+        robot: Robot of the URDF, possibly with locked joints.
 
     Raises:
         ValueError: A mesh is missing.
@@ -55,7 +55,7 @@ def urdf_shapes(urdf: str, robot: Robot) -> Iterator[LinkShape]:
 
 
 def segments(robot: Robot) -> list[tuple[int, Array]]:
-    """Joint and end of each link from its joint to those that follow, and to the tool."""
+    """Return joint and end point of each link segment, to following joints and the tool."""
     model = robot.model
     tool = model.frames[model.getFrameId(robot.tool_frame)]
     ends: list[tuple[int, Array]] = [
@@ -66,16 +66,16 @@ def segments(robot: Robot) -> list[tuple[int, Array]]:
     return ends
 
 
-def stick_radius(ends: list[tuple[int, Array]]) -> float:
-    """Radius of links without geometry [m]."""
-    return STICK * (max(float(np.linalg.norm(end)) for _, end in ends) or 1.0)
+def default_link_radius(ends: list[tuple[int, Array]]) -> float:
+    """Return the radius of links without geometry [m]."""
+    return LINK_RADIUS * (max(float(np.linalg.norm(end)) for _, end in ends) or 1.0)
 
 
-def sticks(robot: Robot) -> list[tuple[int, Hull]]:
-    """Base and links as hulls, from each joint to those that follow."""
+def link_capsules(robot: Robot) -> list[tuple[int, Hull]]:
+    """Return the hulls of a base and of capsules from each joint to the following ones."""
     ends = segments(robot)
-    radius = stick_radius(ends)
-    longest = radius / STICK
+    radius = default_link_radius(ends)
+    longest = radius / LINK_RADIUS
     return [(0, hulls.cylinder(2.0 * radius, 2.0 * radius))] + [
         (parent, hulls.capsule(np.zeros(3), end, radius))
         for parent, end in ends

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Obstacles of a scenario: bodies of the world that robots must not touch.
 
-Nothing in the simulation pushes a robot out of them: distances tell whether one has entered.
+They exert no force in the simulation: a negative distance reports that a robot has entered one.
 """
 
 from dataclasses import dataclass
@@ -22,28 +22,28 @@ from noninteract_ros.team.geometry.hulls import Hull
 from noninteract_ros.team.pose_from_list import pose_from_list
 from noninteract_ros.team.team import Team
 
-EXTENT = (2.0, 2.0, 0.005)  # [m] of a plane as it is drawn
-NOWHERE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
+EXTENT = (2.0, 2.0, 0.005)  # [m] of a drawn plane
+IDENTITY_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Obstacle:
-    """A body of the world."""
+    """Base class of the configuration blocks of obstacles."""
 
     def build(self, name: str, team: Team) -> tuple[list[pin.Model], list[Any]]:
-        """Return no models and no couplings: the simulation does not feel it.
+        """Return no models and no couplings: obstacles exert no force in the simulation.
 
         Raises:
-            ScenarioError: A key is no vector, pose or file.
+            ScenarioError: A key is no valid vector, pose or file.
         """
         self.body(name)
         return [], []
 
     def body(self, name: str) -> Body:
-        """Return its collision body."""
+        """Return the collision body."""
         raise NotImplementedError
 
     def hull(self, name: str) -> Hull:
-        """Return its hull in the world, for pictures."""
+        """Return the hull in the world, for drawing."""
         body = self.body(name)
         if body.convex is not None:
             return hulls.convex_hull(np.array(body.convex.points()))
@@ -59,7 +59,7 @@ class SphereObstacle(Obstacle):
     kind: str = key("Kind of surrounding", "sphere", choices=("sphere",))
 
     def body(self, name: str) -> Body:
-        """Return its collision body."""
+        """Return the collision body."""
         centre = _vector(join(name, "position"), self.position)
         return Body(name, name, 0, Capsule(centre, centre, self.radius))
 
@@ -68,13 +68,13 @@ class SphereObstacle(Obstacle):
 class CapsuleObstacle(Obstacle):
     """Configuration block of a capsule, such as a post."""
 
-    start: tuple[float, ...] = key("One end of its middle line [m]")
-    end: tuple[float, ...] = key("The other end [m]")
+    start: tuple[float, ...] = key("Start of the centre line [m]")
+    end: tuple[float, ...] = key("End of the centre line [m]")
     radius: float = key("Radius [m]", positive=True)
     kind: str = key("Kind of surrounding", "capsule", choices=("capsule",))
 
     def body(self, name: str) -> Body:
-        """Return its collision body."""
+        """Return the collision body."""
         start = _vector(join(name, "start"), self.start)
         return Body(
             name, name, 0, Capsule(start, _vector(join(name, "end"), self.end), self.radius)
@@ -85,12 +85,12 @@ class CapsuleObstacle(Obstacle):
 class BoxObstacle(Obstacle):
     """Configuration block of a box, such as a table."""
 
-    size: tuple[float, ...] = key("Edges along its own axes [m]", positive=True)
-    pose: tuple[float, ...] = key("Pose of its centre: x y z [m], qx qy qz qw", NOWHERE)
+    size: tuple[float, ...] = key("Edge lengths along the axes of the box [m]", positive=True)
+    pose: tuple[float, ...] = key("Pose of the centre: x y z [m], qx qy qz qw", IDENTITY_POSE)
     kind: str = key("Kind of surrounding", "box", choices=("box",))
 
     def body(self, name: str) -> Body:
-        """Return its collision body."""
+        """Return the collision body."""
         size = _vector(join(name, "size"), self.size)
         corners = 0.5 * size * np.array(np.meshgrid(*[(-1.0, 1.0)] * 3)).reshape(3, 8).T
         return _convex(name, corners, pose_from_list(join(name, "pose"), self.pose))
@@ -100,12 +100,12 @@ class BoxObstacle(Obstacle):
 class PlaneObstacle(Obstacle):
     """Configuration block of a plane; the half-space behind it is forbidden."""
 
-    point: tuple[float, ...] = key("A point of the plane [m]")
-    normal: tuple[float, ...] = key("Normal, towards the robots")
+    point: tuple[float, ...] = key("Point of the plane [m]")
+    normal: tuple[float, ...] = key("Normal of the plane, pointing towards the robots")
     kind: str = key("Kind of surrounding", "plane", choices=("plane",))
 
     def body(self, name: str) -> Body:
-        """Return its collision body."""
+        """Return the collision body."""
         point = _vector(join(name, "point"), self.point)
         normal = _vector(join(name, "normal"), self.normal)
         length = float(np.linalg.norm(normal))
@@ -114,7 +114,7 @@ class PlaneObstacle(Obstacle):
         return Body(name, name, 0, Capsule(point, point + normal / length, 0.0), plane=True)
 
     def hull(self, name: str) -> Hull:
-        """Return a thin plate in the plane, for pictures."""
+        """Return a thin plate in the plane, for drawing."""
         capsule = self.body(name).capsule
         normal = capsule.end - capsule.start
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
@@ -126,13 +126,15 @@ class PlaneObstacle(Obstacle):
 class MeshObstacle(Obstacle):
     """Configuration block of the convex hull of a mesh."""
 
-    mesh: str = key("File of the mesh, such as an .stl or .dae")
-    pose: tuple[float, ...] = key("Pose of its frame: x y z [m], qx qy qz qw", NOWHERE)
-    scale: float = key("Factor of its coordinates", 1.0, positive=True)
+    mesh: str = key("Mesh file, such as .stl or .dae")
+    pose: tuple[float, ...] = key(
+        "Pose of the mesh's frame: x y z [m], qx qy qz qw", IDENTITY_POSE
+    )
+    scale: float = key("Scale factor of the mesh's coordinates", 1.0, positive=True)
     kind: str = key("Kind of surrounding", "mesh", choices=("mesh",))
 
     def body(self, name: str) -> Body:
-        """Return its collision body."""
+        """Return the collision body."""
         path = join(name, "mesh")
         if not Path(self.mesh).is_file():
             raise ScenarioError(path, f"no file {self.mesh!r}", "the file of a mesh")

@@ -13,20 +13,20 @@ from noninteract_ros.team.geometry.kernels.derivatives import extremes
 from noninteract_ros.team.geometry.kernels.kinematics import Indices, Tree
 from noninteract_ros.team.team import PRISMATIC, Team
 
-SAMPLES = 10000  # random configurations of the joints' whole range
-REACH = np.pi  # [m or rad] range of a joint without limits, about the start
-NEVER = 0.1  # [m] distance that a pair never falls below in all samples
+SAMPLES = 10000  # random configurations over the joints' range
+REACH = np.pi  # [m or rad] sampled range of an unlimited joint, about the initial position
+NEVER = 0.1  # [m] least distance over all samples for an excluded pair
 
 
 @dataclass(frozen=True)
 class Pairs:
-    """Pairs of bodies by number, and pairs that are left out.
+    """Pairs of bodies by index, and excluded pairs.
 
     Attributes:
-        watched: Shape (m, 2).
-        kinds: Kind of each, as in `kernels`, shape (m,).
-        always: Bodies of one robot that overlap at the start or at all samples.
-        never: Bodies of one robot that stay apart at all samples.
+        watched: Monitored pairs, shape (m, 2).
+        kinds: Kind of each pair, as in `kernels.capsules`, shape (m,).
+        always: Pairs of one robot that overlap initially or in all samples.
+        never: Pairs of one robot that stay apart in all samples.
     """
 
     watched: Indices
@@ -36,10 +36,10 @@ class Pairs:
 
 
 def find_pairs(team: Team, bodies: Sequence[Body], tree: Tree, capsules: Capsules) -> Pairs:
-    """Pairs of bodies on different joints, without neighbours and what needs no watching.
+    """Return the pairs of bodies on different joints that need monitoring.
 
-    Bodies of different owners always count. Those of one robot are sampled over the range of its
-    joints.
+    Neighbours are excluded. Pairs of different owners are always monitored. Pairs of one robot are
+    sampled over the range of its joints.
     """
     found = [
         (i, j) if not bodies[i].plane else (j, i)
@@ -69,21 +69,21 @@ def _may_collide(team: Team, first: Body, second: Body) -> bool:
     parents = team.model.parents
     if first.owner == second.owner:
         return parents[first.joint] != second.joint and parents[second.joint] != first.joint
-    # An arm's first link turns where its base stands on, or beside, what is around it.
+    # The first link of an arm rotates within the mounting of its base.
     return not any(
         _rooted(team, a) and b.joint == 0 for a, b in ((first, second), (second, first))
     )
 
 
 def _rooted(team: Team, body: Body) -> bool:
-    """True for a body that turns about a joint fixed to the world and carries further joints."""
+    """Return True for a body on a world-fixed revolute joint that carries further joints."""
     model, joint = team.model, body.joint
     turns = joint > 0 and model.joints[joint].shortname() not in PRISMATIC
     return turns and model.parents[joint] == 0 and joint in list(model.parents)
 
 
 def joint_range(team: Team) -> tuple[Array, Array]:
-    """Lowest and highest joint positions, shape (n,) each."""
+    """Return the lower and upper joint positions, shape (n,) each."""
     start = team.joints_from_configuration(team.q0)
     lower, upper = team.position_limits
     lower = np.where(np.isfinite(lower), lower, start - REACH)
@@ -93,7 +93,7 @@ def joint_range(team: Team) -> tuple[Array, Array]:
 def _sampled(
     team: Team, pairs: Indices, tree: Tree, capsules: Capsules
 ) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:
-    """Pairs that always overlap or overlap at the start, and pairs that never come near."""
+    """Return the pairs that overlap always or initially, and the pairs that never come close."""
     if not len(pairs):
         return (), ()
     rng, (lower, upper) = np.random.default_rng(0), joint_range(team)

@@ -21,7 +21,7 @@ from noninteract_ros.team.geometry.kernels.vectors import (
 
 SEGMENTS, PLANE, CONVEX = 0, 1, 2  # kinds of pairs
 TINY = 1e-12  # [m^2] squared length below which a segment is a point
-CROSSED = 1e-9  # [m] between segments that cross, which have no normal
+CROSSED = 1e-9  # [m] distance below which segments intersect and have no normal
 PARALLEL = 1e-9  # squared sine of the angle below which two segments are parallel
 
 
@@ -32,7 +32,7 @@ class Capsules(NamedTuple):
         joints: Joint of each body, shape (b,).
         starts: Start of each segment in the joint's frame, shape (b, 3) [m]; a point of a plane.
         ends: End of each segment, shape (b, 3) [m]; for a plane, its unit normal.
-        radii: Shape (b,) [m].
+        radii: Radius of each body, shape (b,) [m]; negative for a plane.
     """
 
     joints: Indices
@@ -43,7 +43,7 @@ class Capsules(NamedTuple):
 
 @compiled
 def place(motion: Motion, capsules: Capsules) -> Array:
-    """Starts and ends of all segments in the world, shape (2, b, 3); normals of planes turn."""
+    """Return starts and ends of all segments in the world, shape (2, b, 3); normals for planes."""
     count = len(capsules.joints)
     out = np.empty((2, count, 3))
     for b in range(count):
@@ -57,7 +57,7 @@ def place(motion: Motion, capsules: Capsules) -> Array:
 
 @inner
 def closest(p: Vector, d1: Vector, q: Vector, d2: Vector) -> tuple[float, float]:
-    """Parameters s, t in [0, 1] of the closest points p + s d1 and q + t d2."""
+    """Return the parameters s, t in [0, 1] of the closest points p + s d1 and q + t d2."""
     r = difference(p, q)
     a, e, b = dot(d1, d1), dot(d2, d2), dot(d1, d2)
     c, f = dot(d1, r), dot(d2, r)
@@ -80,7 +80,7 @@ def closest(p: Vector, d1: Vector, q: Vector, d2: Vector) -> tuple[float, float]
 def distances(
     capsules: Capsules, ends: Array, pairs: Indices, kinds: Indices, reach: float
 ) -> Array:
-    """Distance of each pair, shape (m,) [m]; a lower bound where it exceeds `reach`."""
+    """Return the distance of each pair, shape (m,) [m]; a lower bound if it exceeds `reach`."""
     out = np.empty(len(pairs))
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rates of distances: rows, and what they change by at zero joint acceleration."""
+"""Rates of distances: rows, and drifts at zero joint acceleration."""
 
 from typing import NamedTuple
 
@@ -31,7 +31,7 @@ from noninteract_ros.team.geometry.kernels.vectors import along, at, cross, diff
 
 
 class Near(NamedTuple):
-    """Pairs that are near each other, to be filled; see `clearance.Clearances`."""
+    """Terms of close pairs; see `clearance.Clearances`."""
 
     points: Array
     normals: Array
@@ -55,12 +55,12 @@ def _near(count: int, n: int) -> Near:
 def _segment_pair(
     tree: Tree, motion: Motion, capsules: Capsules, ends: Array, i: int, j: int, k: int, near: Near
 ) -> None:
-    """Fills row k for two capsules.
+    """Write row k for two capsules.
 
     With D = q + t d2 - p - s d1 between the closest points of the segments, n = D/|D| and w the
     relative velocity of the bodies' material points there, the rate is n'w. A parameter inside
-    its segment keeps D across it: d/dt (D'd) = 0 gives its rate. Then the drift is the rate of
-    n'w, in which n turns and the material points change.
+    its segment keeps D perpendicular to it: d/dt (D'd) = 0 gives its rate. Then the drift is the
+    rate of n'w, in which n rotates and the material points change.
     """
     a, b = capsules.joints[i], capsules.joints[j]
     p, q = at(ends[0], i), at(ends[0], j)
@@ -103,7 +103,7 @@ def _segment_pair(
 def _plane_pair(
     tree: Tree, motion: Motion, capsules: Capsules, ends: Array, i: int, j: int, k: int, near: Near
 ) -> None:
-    """Fills row k for a capsule over a plane, which does not move."""
+    """Write row k for a capsule and a plane, which does not move."""
     a, n = capsules.joints[i], at(ends[1], j)
     p, end = at(ends[0], i), at(ends[1], i)
     if dot(n, end) < dot(n, p):
@@ -120,7 +120,7 @@ def _plane_pair(
 def extremes(
     tree: Tree, capsules: Capsules, pairs: Indices, samples: Array
 ) -> tuple[Array, Array]:
-    """Smallest and largest distance of pairs of capsules over positions, shape (s, n)."""
+    """Return smallest and largest distance of pairs of capsules over positions, shape (s, n)."""
     kinds, still = np.full(len(pairs), SEGMENTS), np.zeros(samples.shape[1])
     least, most = np.full(len(pairs), np.inf), np.full(len(pairs), -np.inf)
     for k in range(len(samples)):
@@ -140,7 +140,7 @@ def survey(
     v: Array,
     reach: float,
 ) -> tuple[Motion, Array, Indices, Near]:
-    """Motion, all distances, pairs below the reach and their terms, which convex ones lack."""
+    """Return motion, all distances, pairs within reach and their terms, except convex ones."""
     motion = move(tree, positions, v)
     ends = place(motion, capsules)
     found = distances(capsules, ends, pairs, kinds, reach)
@@ -159,16 +159,16 @@ def survey(
 def contact_terms(
     tree: Tree, motion: Motion, joints: Indices, now: Array, later: Array, ahead: float, near: Near
 ) -> None:
-    """Fills the rows of convex pairs; the drift is a difference of rates.
+    """Write the rows of convex pairs; the drift is a finite difference of rates.
 
     Args:
         tree: Joints.
-        motion: Their motion.
+        motion: Motion of the joints.
         joints: Joints of both bodies of each pair, shape (k, 2).
         now: Normal and nearest points of each pair, shape (k, 3, 3).
-        later: The same some seconds ahead.
-        ahead: These seconds [s].
-        near: What to fill.
+        later: Normal and nearest points `ahead` [s] later, shape (k, 3, 3).
+        ahead: Step of the finite difference [s].
+        near: Output: terms of the pairs.
     """
     for k in range(len(joints)):
         a, b = joints[k, 0], joints[k, 1]

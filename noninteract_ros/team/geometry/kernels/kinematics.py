@@ -27,12 +27,12 @@ class Tree(NamedTuple):
     """Joints of a team, each of one degree of freedom; joint 0 is the world.
 
     Attributes:
-        parents: Joint before each joint, shape (j,).
-        rotations: Placement of each joint in its parent, shape (j, 3, 3).
-        translations: Shape (j, 3) [m].
+        parents: Parent of each joint, shape (j,).
+        rotations: Orientation of each joint in its parent, shape (j, 3, 3).
+        translations: Position of each joint in its parent, shape (j, 3) [m].
         axes: Axis of each joint in its own frame, unit vectors, shape (j, 3).
         sliding: True for prismatic joints, shape (j,).
-        columns: Coordinate of each joint in a velocity; -1 for the world, shape (j,).
+        columns: Index of each joint in a velocity; -1 for the world, shape (j,).
     """
 
     parents: Indices
@@ -47,8 +47,8 @@ class Motion(NamedTuple):
     """Motion of all joint frames in world axes, at zero joint acceleration.
 
     Attributes:
-        rotations: Shape (j, 3, 3).
-        origins: Shape (j, 3) [m].
+        rotations: Orientations, shape (j, 3, 3).
+        origins: Positions, shape (j, 3) [m].
         axes: Joint axes, shape (j, 3).
         angular: Angular velocities, shape (j, 3) [rad/s].
         linear: Velocities of the origins, shape (j, 3) [m/s].
@@ -67,7 +67,7 @@ class Motion(NamedTuple):
 
 @inner
 def _put_rotation(tree: Tree, rotations: Array, j: int, angle: float) -> None:
-    """Rotation of a joint: that of its parent, its placement, its own by Rodrigues' formula."""
+    """Write the rotation of a joint from its parent, its placement and Rodrigues' formula."""
     p, a = tree.parents[j], at(tree.axes, j)
     c, s = np.cos(angle), np.sin(angle)
     for column in range(3):
@@ -81,7 +81,7 @@ def _put_rotation(tree: Tree, rotations: Array, j: int, angle: float) -> None:
 
 @compiled
 def move(tree: Tree, positions: Array, v: Array) -> Motion:
-    """Motion of all joint frames at joint positions and velocities, shape (n,) each."""
+    """Return the motion of all joint frames at positions and velocities, shape (n,) each."""
     count = len(tree.parents)
     vectors, rotations = np.zeros((6, count, 3)), np.zeros((count, 3, 3))
     axes, origins, angular = vectors[0], vectors[1], vectors[2]
@@ -114,7 +114,7 @@ def move(tree: Tree, positions: Array, v: Array) -> Motion:
 
 @inner
 def velocity_of(motion: Motion, j: int, p: Vector, ahead: float) -> Vector:
-    """Velocity of a point of a joint's body, some seconds ahead at zero joint acceleration."""
+    """Return the velocity of a body's point, `ahead` [s] later at zero joint acceleration."""
     w = along(at(motion.angular, j), ahead, at(motion.angular_bias, j))
     v = along(at(motion.linear, j), ahead, at(motion.linear_bias, j))
     origin = along(at(motion.origins, j), ahead, at(motion.linear, j))
@@ -124,7 +124,7 @@ def velocity_of(motion: Motion, j: int, p: Vector, ahead: float) -> Vector:
 
 @inner
 def bias_of(motion: Motion, j: int, p: Vector) -> Vector:
-    """Acceleration of a point of a joint's body at zero joint acceleration."""
+    """Return the acceleration of a body's point at zero joint acceleration."""
     r, w = difference(p, at(motion.origins, j)), at(motion.angular, j)
     turning = added(cross(at(motion.angular_bias, j), r), cross(w, cross(w, r)))
     return added(at(motion.linear_bias, j), turning)
@@ -134,7 +134,7 @@ def bias_of(motion: Motion, j: int, p: Vector) -> Vector:
 def add_row(
     tree: Tree, motion: Motion, j: int, p: Vector, n: Vector, sign: float, row: Array
 ) -> None:
-    """Adds sign n' J of a point of a joint's body to a row, shape (n,)."""
+    """Add sign n' J of a body's point to a row, shape (n,)."""
     while j > 0:
         c, axis = tree.columns[j], at(motion.axes, j)
         if tree.sliding[j]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Vectors of three numbers as tuples, which need no memory of their own."""
+"""Vectors of three numbers as tuples, which need no memory allocation."""
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.compiler import inner
@@ -9,7 +9,7 @@ Vector = tuple[float, float, float]
 
 @inner
 def at(A: Array, i: int) -> Vector:
-    """Row of an array as a tuple, which needs no memory of its own."""
+    """Return a row of an array as a tuple."""
     return A[i, 0], A[i, 1], A[i, 2]
 
 
@@ -33,7 +33,7 @@ def difference(a: Vector, b: Vector) -> Vector:
 
 @inner
 def along(a: Vector, s: float, d: Vector) -> Vector:
-    """a + s d."""
+    """Return a + s d."""
     return a[0] + s * d[0], a[1] + s * d[1], a[2] + s * d[2]
 
 
@@ -51,7 +51,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 @inner
 def turned(R: Array, i: int, x: Vector) -> Vector:
-    """R_i x of a stack of rotations."""
+    """Return R_i x of a stack of rotations."""
     return (
         R[i, 0, 0] * x[0] + R[i, 0, 1] * x[1] + R[i, 0, 2] * x[2],
         R[i, 1, 0] * x[0] + R[i, 1, 1] * x[1] + R[i, 1, 2] * x[2],
