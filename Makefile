@@ -21,7 +21,7 @@ unexport PYTHONPATH AMENT_PREFIX_PATH RMW_IMPLEMENTATION
 SUPPORTED = import sys; print(sys.version_info[:2] in ((3, 11), (3, 12)))
 
 .DEFAULT_GOAL := help
-.PHONY: help venv demo test lint format bench console console-check clean
+.PHONY: help venv demo test lint format bench docs console console-check clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 15
@@ -43,11 +43,16 @@ $(VENV)/installed-robots: $(VENV)/installed
 	$(PIP_INSTALL) --editable '.[robots]'
 	@touch $@
 
+$(VENV)/installed-docs: $(VENV)/installed
+	@echo "Installing the tools of the documentation into $(VENV): half a minute the first time"
+	$(PIP_INSTALL) --editable '.[docs]'
+	@touch $@
+
 $(VENV)/installed-dev: $(METADATA) | $(BIN)/python
 	@echo "Installing into $(VENV): about a minute and 1.5 GB the first time"
 	$(PIP_INSTALL) --editable '.[dev]'
 	@$(COMPILE)
-	@touch $(VENV)/installed $(VENV)/installed-robots $@
+	@touch $(VENV)/installed $(VENV)/installed-robots $(VENV)/installed-docs $@
 
 venv: $(VENV)/installed-dev ## make .venv with the package (editable) and the developers' tools
 
@@ -77,6 +82,11 @@ format: $(VENV)/installed-dev ## rewrite the sources in the project's format
 
 bench: $(VENV)/installed ## measure the law, the controller and the lockstep
 	$(BIN)/noninteract bench $(ARGS)
+
+# The theme warns of MkDocs 2 at every build; setup.py holds MkDocs 1.
+docs: export NO_MKDOCS_2_WARNING = 1
+docs: $(VENV)/installed-docs ## build the documentation site: build/site/index.html
+	$(BIN)/python -m mkdocs build --strict
 
 CONSOLE := web/console
 STATIC := noninteract_ros/console/static

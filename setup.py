@@ -21,6 +21,8 @@ PROGRAMS = {node: f"{NAME}.nodes.{room}.{node}:main" for node, room in NODES.ite
 PROGRAMS["noninteract"] = f"{NAME}.cli:main"
 ROBOTS = ["example-robot-data>=6.0"]  # Models of arms: 130 MB to download, 440 MB on disk.
 PEER = ["mujoco>=4.0"]  # Another simulator's dynamics, to test against: 20 MB to download.
+# MkDocs 2 drops plugins and themes, and Material is made for MkDocs 1 alone.
+DOCS = ["mkdocs>=1.6.1,<2", "mkdocs-material>=9.7.5,<10", "mkdocstrings[python]>=1.0,<2"]
 
 setup(
     name=NAME,
@@ -62,9 +64,11 @@ setup(
     extras_require={
         "robots": ROBOTS,
         "peer": PEER,
+        "docs": DOCS,
         "dev": [
             *ROBOTS,
             *PEER,
+            *DOCS,
             "ruff>=0.17,<0.18",  # Another minor release formats differently.
             "mypy>=2.4",
             "playwright>=1.60",  # Drives the console's page in Chromium, where that is installed.

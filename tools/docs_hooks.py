@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hooks of the documentation site: pages made from the repository, and tables made from the code.
 
-MkDocs calls the functions `on_*`. Files of the repository such as README.md become pages, and links
-to files outside docs/ lead to these pages. A comment `<!-- NAME: ARGUMENT -->` that stands alone on
-a line is replaced by what the generator of that name makes.
+MkDocs calls the functions `on_*`. Files of the repository such as README.md become pages, and
+links to files outside docs/ lead to these pages. A comment `<!-- NAME: ARGUMENT -->` that stands
+alone on a line is replaced by what the generator of that name makes.
 """
 
 import ast
@@ -24,7 +24,7 @@ import command_reference  # noqa: E402
 import scenario_reference  # noqa: E402
 
 PACKAGE = "noninteract_ros"
-MARKER = re.compile(r"^<!-- ([a-z]+)(?:: ([\w.]+))? -->$", re.MULTILINE)
+MARKER = re.compile(r"^<!-- ([a-z]+)(?:: ([\w./]+))? -->$", re.MULTILINE)
 LINK = re.compile(r"(?<=\]\()([^)\s#:]+)(#[^)\s]*)?(?=\))")
 # Files of the repository that are pages of the site.
 PAGES = {
