@@ -236,10 +236,8 @@ def test_walk_through_a_tick_names_what_exists() -> None:
     """Every call of the walk is a method of a class of the module that it names."""
     rows = next(rows for heading, rows in tables(ARCHITECTURE) if heading == "One tick")
     for row in rows:
-        *folders, owner, method = codes(row[1])[0].split(".")
-        tree = ast.parse(
-            (ROOT / structure.PACKAGE / "/".join(folders)).with_suffix(".py").read_text()
-        )
+        owner, method = codes(row[1])[0].split(".")
+        tree = ast.parse((ROOT / structure.PACKAGE / codes(row[2])[0]).read_text())
         (found,) = [
             item for item in tree.body if isinstance(item, ast.ClassDef) and item.name == owner
         ]
