@@ -5,6 +5,7 @@ import functools
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 import threading
@@ -16,7 +17,6 @@ from pathlib import Path
 import pytest
 import scenario_reference
 from repository import ROOT
-from show import launch, missing
 
 # What a page fetches by itself; links that a reader follows are no such thing.
 FETCHED = {
@@ -29,6 +29,8 @@ FETCHED = {
     "source": "src",
     "video": "src",
 }
+CHROMIUM = shutil.which("chromium")
+DEADLINE = 120e3  # [ms] for a browser on a busy machine
 NOT_FETCHED = ("canonical", "next", "prev")  # relations of <link>
 
 
@@ -130,7 +132,7 @@ class QuietHandler(SimpleHTTPRequestHandler):
         """Log nothing."""
 
 
-@pytest.mark.skipif(bool(missing()), reason=missing())
+@pytest.mark.skipif(CHROMIUM is None, reason="no chromium here: apt-get install chromium")
 @pytest.mark.parametrize("scheme", ["http", "file"])
 def test_formulas_and_search_work_without_the_network(
     site: Path, address: str, scheme: str
@@ -141,8 +143,9 @@ def test_formulas_and_search_work_without_the_network(
     root = address if scheme == "http" else site.as_uri()
     asked: list[str] = []
     with sync_playwright() as playwright:
-        browser = launch(playwright)
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         page = browser.new_page()
+        page.set_default_timeout(DEADLINE)
         page.on("request", lambda request: asked.append(request.url))
         page.goto(f"{root}/derivations.html")
         page.wait_for_selector(".katex")

@@ -34,6 +34,7 @@ PAGES = {
     "LICENSE": "license.md",
 }
 SOURCES = {page: source for source, page in PAGES.items()}
+ALONE = ("index.md", "tutorial.md")  # pages without others beside them
 INTERNAL = ("control.fast", "control.telemetry")  # rooms without a public interface
 
 
@@ -52,6 +53,8 @@ def on_files(files: Any, config: Any) -> Any:
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
     """Lead links outside docs/ to pages of the site, and expand the markers."""
     source = page.file.src_uri
+    if source in ALONE:
+        page.meta["hide"] = ["navigation"]
     path = SOURCES.get(source, f"docs/{source}")
     linked = LINK.sub(lambda link: site_link(path, source, link[1], link[2] or ""), markdown)
     return expanded(linked)
