@@ -113,11 +113,10 @@ def test_commands_name_what_exists(block: Block) -> None:
 
 
 @named(blocks("python"))
-def test_code_runs(block: Block, tmp_path: Path) -> None:
+def test_code_runs(block: Block) -> None:
     """Printed Python runs as it stands."""
-    file = tmp_path / "block.py"
-    file.write_text(block.text)
-    ended = subprocess.run([sys.executable, file], cwd=ROOT, capture_output=True, text=True)
+    run = [sys.executable, "-c", block.text]
+    ended = subprocess.run(run, cwd=ROOT, capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
 
 
