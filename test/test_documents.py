@@ -54,10 +54,10 @@ def is_scenario(block: Block) -> bool:
 
 def parameters_of(content: Mapping[str, Any]) -> dict[str, Any]:
     """Return the nested parameters of a scenario, with descriptions in the place of topics."""
-    values = nest(content["/**"]["ros__parameters"])
+    values, urdf = nest(content["/**"]["ros__parameters"]), read_urdf("urdf", PANDA)
     for name in values["robots"]:
         if str(values[name].get("urdf", "")).startswith("topic:"):
-            values[name]["urdf_text"] = read_urdf("urdf", PANDA).replace("panda_", f"{name}_")
+            values[name]["urdf_text"] = re.sub("panda_(?!desc)", f"{name}_", urdf)
     return values
 
 
