@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whatever arrives on whatever topic, a run goes on as if it had not arrived."""
+"""Invalid messages on any topic do not change a run."""
 
 import itertools
 import math
@@ -23,7 +23,7 @@ Spoil = Callable[[Any], None]
 
 
 def setting(path: str, value: Any) -> Spoil:
-    """Sets an attribute of an attribute of a message."""
+    """Return a function that sets a nested attribute of a message."""
 
     def spoil(message: Any) -> None:
         *owners, name = path.split(".")
@@ -114,7 +114,7 @@ def reference(element: str) -> MultiDOFJointTrajectory:
 
 
 def topics() -> Iterator[tuple[str, str, type, Callable[[], Any], dict[str, Spoil]]]:
-    """Node, topic, type, what a good message looks like, and the ways to spoil it."""
+    """Yield node, topic, type, factory of valid messages, and ways to spoil them by reason."""
     zeros = [0.0] * 4
     states = joint_kinds(("position",))
     for node in ("controller", "haptic_emulator", "relative_planner"):
@@ -138,64 +138,73 @@ def topics() -> Iterator[tuple[str, str, type, Callable[[], Any], dict[str, Spoi
         yield "controller", f"{base}/wrench", WrenchStamped, WrenchStamped, wrench
 
 
-class Pest:
-    """Publishes good and bad messages on one topic, and knows which node has to refuse them."""
+class InvalidPublisher:
+    """Publisher of valid and invalid messages on one topic of a node.
 
-    def __init__(self, stack: Stack, node: str, topic: str, kind: type) -> None:
+    Args:
+        stack: Running stack.
+        node: Name of the node that must reject invalid messages.
+        topic: Topic.
+        message_type: Message type.
+    """
+
+    def __init__(self, stack: Stack, node: str, topic: str, message_type: type) -> None:
         self._stack, self._node, self._topic = stack, node, topic
-        self._publisher = stack.ros.probe.create_publisher(kind, topic, 10)
+        self._publisher = stack.ros.probe.create_publisher(message_type, topic, 10)
 
-    def ready(self) -> bool:
+    def matched(self) -> bool:
         count = self._stack.ros.probe.count_subscribers(self._publisher.topic_name)
         return bool(self._publisher.get_subscription_count() == count)
 
     def publish(self, message: Any) -> None:
         self._publisher.publish(message)
 
-    def refused(self) -> int:
+    def rejections(self) -> int:
         values = self._stack.monitor.status.get(self._node, (0, "", {}))[2]
         return int(values.get(f"rejected on {self._topic}", 0))
 
-    def annoy(self, message: Any, reason: str) -> None:
-        """Publishes what must be refused for a reason, and waits until the node says so."""
-        before = self.refused()
+    def expect_rejection(self, message: Any, reason: str) -> None:
+        """Publish an invalid message, and wait until the node has rejected it for a reason."""
+        before = self.rejections()
         self._publisher.publish(message)
 
-        def said() -> bool:
+        def rejected() -> bool:
             self._stack.nodes[self._node].publish_diagnostics()
             values = self._stack.monitor.status.get(self._node, (0, "", {}))[2]
             last = values.get("last rejection", "")
             named = last.startswith(f"{self._topic}: ") and re.search(reason, last)
-            return self.refused() > before and bool(named)
+            return self.rejections() > before and bool(named)
 
-        until(said, f"{self._node} refuses {self._topic}: {reason}")
+        until(rejected, f"{self._node} rejects {self._topic}: {reason}")
 
 
 def harmless(topic: str) -> bool:
-    """Whether a good message of a stranger changes nothing: it is of no authority, or zero."""
-    led = topic.startswith(("cooperative/human", "relative/autonomy"))
+    """Return True if a valid message has no effect: it is zero, or without authority."""
+    has_authority = topic.startswith(("cooperative/human", "relative/autonomy"))
     own = topic.startswith("joint") or topic.endswith(("external_wrench", "feedback"))
-    return topic.endswith("/wrench") or not (led or own)
+    return topic.endswith("/wrench") or not (has_authority or own)
 
 
-def test_bad_input_of_every_kind_changes_nothing(ros: Ros) -> None:
-    """It is refused, counted and named; the states stay those of a run without it, to the bit."""
+def test_invalid_messages_have_no_effect(ros: Ros) -> None:
+    """They are rejected, counted and reported; states equal those of a run without them."""
     values = paper(haptic={"hand_mass": 0.5}, lockstep_timeout=20.0)
     stack = ros.stack(values)
-    pests = [(Pest(stack, *where), make, kinds) for *where, make, kinds in topics()]
-    until(lambda: all(pest.ready() for pest, *_ in pests), "everybody hears the pests")
+    publishers = [
+        (InvalidPublisher(stack, *where), make, kinds) for *where, make, kinds in topics()
+    ]
+    until(lambda: all(item.matched() for item, *_ in publishers), "all subscribers matched")
     stack.start()
     stack.run_until(0.1)
-    for (_, topic, *_), (pest, make, kinds) in zip(topics(), pests, strict=True):
+    for (_, topic, *_), (publisher, make, kinds) in zip(topics(), publishers, strict=True):
         if harmless(topic):
-            good = make()
-            good.header.stamp.nanosec = 10**6
-            pest.publish(good)
+            valid = make()
+            valid.header.stamp.nanosec = 10**6
+            publisher.publish(valid)
         for reason, spoil in kinds.items():
-            bad = make()
-            spoil(bad)
-            pest.annoy(bad, reason)
-    # Good stamps are ticks; those of the pests are none, or far ahead.
+            invalid = make()
+            spoil(invalid)
+            publisher.expect_rejection(invalid, reason)
+    # Stamps of the team are ticks; those of the publishers are not, or are far ahead.
     own = {
         stamp: data
         for stamp, data in list(stack.monitor.states.items())

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A demo in which somebody dies: clear words, a status, and nobody is left."""
+"""End of a demo after a program was killed."""
 
 import os
 import re
@@ -18,21 +18,21 @@ from noninteract_ros.reporting.recording.repair import repair
 
 
 def programs_of(process: int) -> dict[str, int]:
-    """Process ids of the programs that a process has started, by name."""
-    found = {}
+    """Return the ids of the programs that a process has started, by name."""
+    processes = {}
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             parent = int((folder / "stat").read_text().rpartition(")")[2].split()[1])
             command = (folder / "cmdline").read_text().split("\0")
-        except OSError:  # It has ended meanwhile.
+        except OSError:  # It has ended.
             continue
         if parent == process and len(command) > 3:
-            found[command[3]] = int(folder.name)  # python -m noninteract_ros.nodes NAME
-    return found
+            processes[command[3]] = int(folder.name)  # python -m noninteract_ros.nodes NAME
+    return processes
 
 
 def alive(process: int) -> bool:
-    """Whether a process runs; one that has ended and that nobody asked after does not."""
+    """Return True if a process runs; a zombie does not."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -40,25 +40,25 @@ def alive(process: int) -> bool:
 
 
 @pytest.mark.parametrize("victim", ["controller", "recorder", "demo"])
-def test_whoever_is_killed_nobody_is_left(victim: str, domain: int, tmp_path: Path) -> None:
-    """The demo says who it was, and where the recording lies; without it the programs end."""
+def test_all_programs_end_when_one_is_killed(victim: str, domain: int, tmp_path: Path) -> None:
+    """The demo reports the program and the recording; programs end with the demo."""
     out = tmp_path / "run"
     alone = {"haptic": None, "planner": None, "lockstep_sources": None}
     scenario = write(tmp_path / "alone.yaml", paper(**alone))
     command = ["-m", "noninteract_ros.cli", "demo", str(scenario)]
     environment = {"ROS_DOMAIN_ID": str(domain), "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
-    with (tmp_path / "said").open("w") as said:
+    with (tmp_path / "output").open("w") as output:
         demo = subprocess.Popen(
             [sys.executable, *command, "--duration", "1000", "--out", str(out)],
             cwd=ROOT,
             env=os.environ | environment | {"COLUMNS": "200"},
-            stdout=said,
-            stderr=said,
+            stdout=output,
+            stderr=output,
         )
-    told = (tmp_path / "said").read_text
+    output_text = (tmp_path / "output").read_text
     recording, programs = out / "run.mcap", dict[str, int]()
     try:
-        until(lambda: recording.exists() and recording.stat().st_size > 2**16, told)
+        until(lambda: recording.exists() and recording.stat().st_size > 2**16, output_text)
         programs = programs_of(demo.pid)
         assert set(programs) == {"recorder", "robot_team", "controller"}
         os.kill({"demo": demo.pid, **programs}[victim], signal.SIGKILL)
@@ -72,6 +72,6 @@ def test_whoever_is_killed_nobody_is_left(victim: str, domain: int, tmp_path: Pa
         assert repair(recording).intact
         return
     assert status == 1
-    assert re.search(f"noninteract: {victim} was ended by SIGKILL", told()), told()
-    assert f"Recorded until the failure in {recording}" in told()
+    assert re.search(f"noninteract: {victim} was ended by SIGKILL", output_text()), output_text()
+    assert f"Recorded until the failure in {recording}" in output_text()
     assert repair(recording).intact == (victim != "recorder")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Thirty robots through the same stack."""
+"""Stack with thirty robots."""
 
 import numpy as np
 from harness import Ros, merged
@@ -16,8 +16,8 @@ def scenario() -> dict:
     return read_parameters(ROOT / "config" / "formation.yaml")
 
 
-def test_thirty_robots_run_through_the_stack(ros: Ros) -> None:
-    """All nodes, in lockstep: the states are the rehearsal's, to the bit."""
+def test_a_run_of_thirty_robots_equals_the_rehearsal(ros: Ros) -> None:
+    """States of all nodes in lockstep equal the rehearsal bit by bit."""
     values = scenario()
     rate = values["rate"]
     stack = ros.stack(merged(values, {"end_time": TICKS / rate})).start()
@@ -30,8 +30,8 @@ def test_thirty_robots_run_through_the_stack(ros: Ros) -> None:
     np.testing.assert_array_equal(effort[1:], expected.torque)
 
 
-def test_the_formation_changes_shape_while_it_is_led_in_a_circle() -> None:
-    """To the end: every distance as planned, and the weighted mean on the human's circle."""
+def test_the_formation_changes_shape_while_it_moves_in_a_circle() -> None:
+    """Distances follow the plan, and the weighted mean follows the circle of the human."""
     built = Scenario.from_dict(scenario())
     history = rehearse(built, built.general.duration)
     error = np.abs(history.x - history.desired)

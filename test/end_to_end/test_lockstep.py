@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The programs in lockstep: the same numbers on every run, and those of the rehearsal."""
+"""Programs in lockstep: every run equals the rehearsal."""
 
 import numpy as np
 import pytest
@@ -16,8 +16,8 @@ TICKS = 1000
 
 
 @pytest.mark.parametrize("run", [1, 2])
-def test_every_run_is_the_rehearsal(ros: Ros, programs: Programs, run: int) -> None:
-    """States and commands of four processes are the rehearsal's to the bit, so all runs agree."""
+def test_every_run_equals_the_rehearsal(ros: Ros, programs: Programs, run: int) -> None:
+    """States and commands of four processes equal the rehearsal bit by bit."""
     values = paper(start_paused=True, end_time=TICKS / 1000, haptic={"start_time": 0.2})
     monitor = ros.monitor(values)
     programs.start_all(NAMES, values, monitor)
@@ -38,8 +38,8 @@ def test_every_run_is_the_rehearsal(ros: Ros, programs: Programs, run: int) -> N
     assert not monitor.commands
 
 
-def test_a_hand_that_feels_is_waited_for(ros: Ros) -> None:
-    """With feedback in the loop, device and controller take turns as in the rehearsal."""
+def test_feedback_is_exchanged_in_lockstep(ros: Ros) -> None:
+    """Device and controller alternate as in the rehearsal."""
     values = paper(haptic={"hand_mass": 0.5}, end_time=0.3)
     stack = ros.stack(values).start()
     stack.monitor.wait_for_status("robot_team", "finished")
@@ -51,8 +51,8 @@ def test_a_hand_that_feels_is_waited_for(ros: Ros) -> None:
     assert np.abs(expected.desired - rigid.desired).max() > 1e-4
 
 
-def test_sources_that_are_missing_are_not_waited_for_for_long(ros: Ros) -> None:
-    """A source that is not started, or falls silent, holds the team up for a while only."""
+def test_missing_sources_time_out(ros: Ros) -> None:
+    """A source that is not started, or ends, delays the team only until its timeout."""
     values = paper(haptic=None, lockstep_sources=["relative/autonomy"], lockstep_timeout=0.3)
     stack = ros.stack(values).start()
     stack.run_until(0.1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Robots with topics of their own, as programs of their own: the same motion as in one program."""
+"""Programs with topics for each robot: the same motion as in the rehearsal."""
 
 import signal
 from typing import Any
@@ -23,8 +23,8 @@ def own_robots(**changes: Any) -> dict[str, Any]:
     return merged(read_parameters(ROOT / "config" / "own_robots.yaml"), changes)
 
 
-def test_the_wiring_changes_nothing_in_lockstep(ros: Ros, programs: Programs) -> None:
-    """Over 0.5 s of motion the states are those of a rehearsal, to rounding of gravity."""
+def test_topics_of_each_robot_do_not_change_a_lockstep_run(ros: Ros, programs: Programs) -> None:
+    """States over 0.5 s of motion equal the rehearsal, up to rounding of gravity."""
     values = own_robots(end_time=0.5, start_paused=True, haptic={"start_time": 0.05})
     monitor = ros.monitor(values)
     programs.start_all(NAMES, values, monitor)
@@ -39,7 +39,7 @@ def test_the_wiring_changes_nothing_in_lockstep(ros: Ros, programs: Programs) ->
     np.testing.assert_allclose(effort[1:], expected.torque, atol=1e-9)
 
 
-# Slow and soft enough for any machine.
+# Slow and compliant enough for any machine.
 WALL: dict[str, Any] = {
     "lockstep": False,
     "rate": 200.0,
@@ -54,35 +54,35 @@ WALL: dict[str, Any] = {
 }
 
 
-def test_in_wall_time_they_reach_and_hold_a_place(ros: Ros, programs: Programs) -> None:
-    """Two arms that speak at different times are led; without a controller each brakes."""
+def test_arms_reach_a_reference_in_wall_time(ros: Ros, programs: Programs) -> None:
+    """Two arms with different stamps follow the reference; without a controller they brake."""
     values = own_robots(**WALL)
     monitor = ros.monitor(values)
     team = Scenario.from_dict(values).build_team()
 
-    def middle() -> Any:
+    def centre() -> Any:
         newest = monitor.newest().position if monitor.states else team.q0
         return team.state(np.array(newest), np.zeros(4)).tool_positions[:, ::2].mean(axis=0)
 
     programs.start_all(NAMES, values, monitor)
-    until(lambda: np.abs(middle() - [0.0, 0.5]).max() < 0.01, "the place")
+    until(lambda: np.abs(centre() - [0.0, 0.5]).max() < 0.01, "the reference reached")
     programs.kill("controller")
     monitor.wait_for_status("robot_team", "braking: command timeout")
 
 
-def test_a_controller_that_is_ended_brakes_the_team_first(ros: Ros, programs: Programs) -> None:
-    """Its last words are gravity alone, since effort controllers hold them for ever."""
+def test_the_controller_brakes_the_team_on_shutdown(ros: Ros, programs: Programs) -> None:
+    """Its last command is gravity alone, since effort controllers hold it indefinitely."""
     circle = {"motion": "circle", "centre": [0.0, 0.6], "start_time": 0.0, "ramp_time": 1.0}
     values = own_robots(**merged(WALL, {"haptic": circle}))
     monitor = ros.monitor(values)
-    heard: dict[str, list[float]] = {}
+    torques: dict[str, list[float]] = {}
     for side in ("left", "right"):
 
-        def note(message: Float64MultiArray, side: str = side) -> None:
-            heard[side] = list(message.data)
+        def on_torques(message: Float64MultiArray, side: str = side) -> None:
+            torques[side] = list(message.data)
 
         topic = f"{side}_effort_controller/commands"
-        ros.probe.create_subscription(Float64MultiArray, topic, note, 10)
+        ros.probe.create_subscription(Float64MultiArray, topic, on_torques, 10)
     programs.start_all(NAMES, values, monitor)
     until(
         lambda: monitor.states and np.abs(monitor.newest().velocity).max() > 0.1, "the team moves"
@@ -93,13 +93,13 @@ def test_a_controller_that_is_ended_brakes_the_team_first(ros: Ros, programs: Pr
     last = monitor.newest()
     assert np.abs(last.velocity).max() < 0.02
     gravity = Scenario.from_dict(values).build_team().gravity(last.position)
-    until(lambda: heard["left"] == [0.0, 0.0], "that the left arm is left to its own gravity")
-    np.testing.assert_allclose(heard["right"], gravity[2:], rtol=0.01)
+    until(lambda: torques["left"] == [0.0, 0.0], "gravity alone for the left arm")
+    np.testing.assert_allclose(torques["right"], gravity[2:], rtol=0.01)
 
 
 @pytest.mark.parametrize("label", ["", "state stamp 0000000000000000007 ns"])
-def test_arrays_that_answer_nothing_do_not_move_a_lockstep_team(ros: Ros, label: str) -> None:
-    """Torques without the stamp of a state, or with a wrong one, are refused with the reason."""
+def test_torques_without_a_valid_stamp_are_rejected_in_lockstep(ros: Ros, label: str) -> None:
+    """The reason is reported, and the team does not step."""
     values = own_robots(haptic=None, planner=None, lockstep_sources=None)
     monitor: TeamMonitor = ros.monitor(values)
     team = ros.make("robot_team", values)
@@ -113,5 +113,5 @@ def test_arrays_that_answer_nothing_do_not_move_a_lockstep_team(ros: Ros, label:
         message.layout.dim = [MultiArrayDimension(label=label, size=2, stride=2)]
         publisher.publish(message)
     expected = "answers no state" if label else "no stamp of the answered state"
-    until(lambda: expected in monitor.value("robot_team", "last rejection"), "the refusal")
+    until(lambda: expected in monitor.value("robot_team", "last rejection"), "the rejection")
     assert team._simulation.tick == 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Anybody may lead the team from another process."""
+"""References and set-points from another process."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from programs import Programs
 from waiting import until
 
 PLACE = (0.25, -0.15)
-# What a person at a terminal can do: no stamp, no clock of the team, ten times a second.
+# As from a terminal: no stamp, no clock of the team, 10 Hz.
 TARGET = f"""
 import time, rclpy
 from geometry_msgs.msg import PoseStamped
@@ -46,7 +46,7 @@ while True:
 def test_the_team_follows_another_process(
     ros: Ros, programs: Programs, program: str, lockstep: bool
 ) -> None:
-    """The cooperative value goes where it is told, without a jump; the relative one stays."""
+    """The cooperative value reaches the reference without a jump; the relative one stays."""
     stiff = {"stiffness": [400.0, 400.0], "takeover": "shaped", "timeout": 3.0}
     values = paper(
         rate=200.0,
@@ -64,13 +64,13 @@ def test_the_team_follows_another_process(
     stack.monitor.wait_for_status("controller", "holding cooperative: source silent")
     programs.python("person", "-c", program)
 
-    def there() -> bool:
+    def reached() -> bool:
         positions = np.reshape(stack.monitor.newest().position, (2, 2))
         return bool(np.abs(positions.mean(axis=0) - PLACE).max() < 2e-3)
 
-    until(there, "the team is there")
+    until(reached, "the reference reached")
     positions = np.reshape(stack.monitor.history(dict(stack.monitor.states))[1], (-1, 2, 2))
     apart = positions[:, 0] - positions[:, 1]
     np.testing.assert_allclose(apart, np.ones_like(apart), atol=1e-3 if not lockstep else 1e-9)
-    # A jump of the reference would throw the team off by half of it and more at once.
+    # A jump of the reference would move the team by at least half of it at once.
     assert np.abs(np.diff(positions.mean(axis=1), axis=0)).max() < 0.02

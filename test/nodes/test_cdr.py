@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Serialized messages read and written in place agree with the middleware's own serialization."""
+"""Messages serialized in place agree with the serialization of the middleware."""
 
 import random
 
@@ -23,7 +23,7 @@ SHAPES = (QUANTITIES, ("effort",), ("position",), ("position", "velocity"), ())
 
 
 def names_of(count: int) -> list[str]:
-    """Names of every length modulo 8, so that the numbers begin at every alignment."""
+    """Return names of every length modulo 8, for every alignment of the numbers."""
     return [f"r{i}/" + "q" * (i % 8) for i in range(count)]
 
 
@@ -40,17 +40,17 @@ def message(names=NAMES, sec: int = 12, nanosec: int = 345_678_901, **arrays) ->
 
 @pytest.fixture
 def in_place_only(monkeypatch):
-    """Fails the test where a message is not read in place."""
+    """Fail the test if a message is not read in place."""
 
-    def refuse(*_):
+    def fail(*_):
         pytest.fail("the bytes were deserialized")
 
-    monkeypatch.setattr(cdr, "deserialize_message", refuse)
+    monkeypatch.setattr(cdr, "deserialize_message", fail)
 
 
 @pytest.mark.parametrize("given", SHAPES, ids="+".join)
 @pytest.mark.parametrize("count", range(41))
-def test_middleware_reads_what_is_encoded(count, given):
+def test_the_middleware_reads_encoded_messages(count, given):
     names, arrays = names_of(count), numbers(count, given)
     codec = JointStateCodec(names, frame_id="fr" * (count % 3))
     read = deserialize_message(codec.encode(STAMP, **arrays), JointState)
@@ -63,7 +63,7 @@ def test_middleware_reads_what_is_encoded(count, given):
 
 @pytest.mark.parametrize("given", SHAPES[:2], ids="+".join)
 @pytest.mark.parametrize("count", range(41))
-def test_what_the_middleware_wrote_is_read_in_place(count, given, in_place_only):
+def test_messages_of_the_middleware_are_read_in_place(count, given, in_place_only):
     names, arrays = names_of(count), numbers(count, given)
     found = JointStateCodec(names).decode(serialize_message(message(names, **arrays)))
     assert found.stamp_ns == STAMP
@@ -75,23 +75,23 @@ def test_what_the_middleware_wrote_is_read_in_place(count, given, in_place_only)
             assert array is None
 
 
-def test_gaps_between_fields_do_not_matter(in_place_only):
-    """The middleware leaves whatever was in memory between fields of unlike alignment."""
+def test_padding_is_ignored(in_place_only):
+    """The middleware does not clear padding between fields."""
     codec = JointStateCodec(["abc"])
     data = bytearray(codec.encode(STAMP, effort=np.array([2.5])))
-    gap = 4 + 8 + 4 + 1  # after the empty frame, before the count of the names
-    assert data[gap : gap + 3] == bytes(3)
-    data[gap : gap + 3] = b"xyz"
+    padding = 4 + 8 + 4 + 1  # after the empty frame, before the number of names
+    assert data[padding : padding + 3] == bytes(3)
+    data[padding : padding + 3] = b"xyz"
     assert codec.decode(bytes(data)).effort == [2.5]
 
 
-def test_trailing_bytes_do_not_matter(in_place_only):
+def test_trailing_bytes_are_ignored(in_place_only):
     codec = JointStateCodec(NAMES)
     assert codec.decode(codec.encode(STAMP, effort=np.ones(3)) + b"tail").stamp_ns == STAMP
 
 
-def test_other_layouts_are_read_too():
-    """Big-endian bytes, another frame and a part of the arrays go through the middleware."""
+def test_other_layouts_are_read_by_the_middleware():
+    """Big-endian bytes, another frame or fewer arrays are deserialized."""
     codec = JointStateCodec(NAMES)
     framed = message(velocity=[1, 2, 3])
     framed.header.frame_id = "base"
@@ -113,8 +113,8 @@ def test_decoded_arrays_are_copies():
     np.testing.assert_array_equal(first.position, kept)
 
 
-def test_names_may_come_in_any_order():
-    """Joints are matched by name, whatever their order in the message."""
+def test_joints_may_be_in_any_order():
+    """Joints are matched by name."""
     codec, arrays = JointStateCodec(NAMES), numbers(3)
     order = [2, 0, 1]
     shuffled = {name: array[order] for name, array in arrays.items()}
@@ -146,22 +146,22 @@ def test_names_may_come_in_any_order():
         (message(nanosec=10**9, position=[1, 2, 3], effort=[1, 2, 3]), "is not a time"),
     ],
 )
-def test_bad_messages_are_refused_with_a_reason(bad, reason):
-    """In place or by the middleware, the same message is refused for the same reason."""
+def test_invalid_messages_are_rejected(bad, reason):
+    """The reason is the same in place and by the middleware."""
     codec = JointStateCodec(NAMES, required=("effort",))
     for read in (codec.from_message, lambda m: codec.decode(serialize_message(m))):
-        with pytest.raises(InputError) as refused:
+        with pytest.raises(InputError) as rejected:
             read(bad)
-        assert str(refused.value).startswith(reason) or reason in str(refused.value)
+        assert str(rejected.value).startswith(reason) or reason in str(rejected.value)
 
 
 @pytest.mark.parametrize("data", [b"", b"\0\1\0\0", b"\xff" * 200, bytes(7)], ids=repr)
-def test_bytes_that_are_no_message_are_refused(data):
+def test_bytes_of_another_message_are_rejected(data):
     with pytest.raises(InputError, match="the bytes are not a JointState"):
         JointStateCodec(NAMES).decode(data)
 
 
-def test_truncated_messages_are_refused():
+def test_truncated_messages_are_rejected():
     codec = JointStateCodec(NAMES)
     data = codec.encode(STAMP, **numbers(3))
     for length in range(len(data)):
@@ -170,7 +170,7 @@ def test_truncated_messages_are_refused():
 
 
 def mutated(data: bytes, rng: random.Random) -> bytes:
-    """Bytes with a few bits, bytes or lengths changed."""
+    """Return the bytes with a few of them changed, removed or added."""
     changed = bytearray(data)
     for _ in range(rng.choice((1, 1, 2, 5))):
         at = rng.randrange(len(changed) + 1)
@@ -186,21 +186,21 @@ def mutated(data: bytes, rng: random.Random) -> bytes:
     return bytes(changed)
 
 
-def test_random_damage_never_raises_anything_but_input_errors():
-    """Damaged bytes either are refused or give finite numbers of the right size."""
-    codec, rng, refused = JointStateCodec(NAMES), random.Random(1), 0
-    sound = [codec.encode(STAMP, **numbers(3, given)) for given in SHAPES]
-    sound.append(serialize_message(message(NAMES[::-1], **numbers(3))))
+def test_corrupt_messages_raise_input_errors_only():
+    """Corrupt bytes are rejected or give finite numbers of the right size."""
+    codec, rng, rejections = JointStateCodec(NAMES), random.Random(1), 0
+    valid = [codec.encode(STAMP, **numbers(3, given)) for given in SHAPES]
+    valid.append(serialize_message(message(NAMES[::-1], **numbers(3))))
     for _ in range(6000):
         try:
-            found = codec.decode(mutated(rng.choice(sound), rng))
+            found = codec.decode(mutated(rng.choice(valid), rng))
         except InputError:
-            refused += 1
+            rejections += 1
             continue
         assert found.stamp_ns >= 0
         for array in (found.position, found.velocity, found.effort):
             assert array is None or (array.shape == (3,) and np.isfinite(array).all())
-    assert 1000 < refused < 6000
+    assert 1000 < rejections < 6000
 
 
 def test_wrong_sizes_are_not_encoded():
@@ -210,11 +210,11 @@ def test_wrong_sizes_are_not_encoded():
             codec.encode(STAMP, effort=np.zeros(size))
 
 
-def test_stamps_join_exactly():
+def test_stamps_are_converted_exactly():
     assert join_stamp(2**31 - 1, 999_999_999) == (2**31 - 1) * 10**9 + 999_999_999
 
 
 def test_long_names_are_shortened_in_the_reason():
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(InputError) as rejected:
         order_by_name(["x" * 10_000], ["a"], "joint")
-    assert len(str(refused.value)) < 200
+    assert len(str(rejected.value)) < 200

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Messages become arrays exactly, or are refused whole with a reason that names the thing."""
+"""Messages are converted to arrays exactly, or rejected with a reason."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ NAN, INF = float("nan"), float("inf")
 
 
 def motion(codec: SubtaskCodec = PAIR, orders: int = 3) -> list[np.ndarray]:
-    """Position, velocity, acceleration; no two numbers alike."""
+    """Return position, velocity, acceleration, all numbers different."""
     dim = len(codec.elements) * len(codec.axes)
     return [10.0 * order + np.arange(1.0, dim + 1.0) for order in range(orders)]
 
@@ -32,7 +32,7 @@ def trajectory(codec: SubtaskCodec = PAIR, orders: int = 3) -> MultiDOFJointTraj
 
 
 def changed(message, path: str, value):
-    """The message with `a.b[0].c` set, for a path `a.b.0.c`."""
+    """Return the message with `a.b[0].c` set, for a path `a.b.0.c`."""
     *parents, last = path.split(".")
     owner = message
     for name in parents:
@@ -42,7 +42,7 @@ def changed(message, path: str, value):
 
 
 def stamped(kind, path: str = "header.frame_id", value="world"):
-    """A message of a kind at STAMP, with one field set."""
+    """Return a message of a type at STAMP with one field set."""
     message = kind()
     message.header.stamp = messages.to_stamp(STAMP)
     return changed(message, path, value)
@@ -61,18 +61,18 @@ def assert_motion(found, expected: list[np.ndarray]) -> None:
 
 
 @pytest.mark.parametrize("ns", [0, 1, 999_999_999, 10**9, STAMP, (2**31 - 1) * 10**9])
-def test_stamps_go_and_come_back_exactly(ns):
+def test_stamps_are_converted_exactly(ns):
     assert messages.stamp_ns(messages.to_stamp(ns)) == ns
 
 
 @pytest.mark.parametrize(("sec", "nanosec"), [(-1, 0), (0, 10**9), (3, 2**32 - 1)])
-def test_stamps_that_are_no_time_are_refused(sec, nanosec):
+def test_invalid_stamps_are_rejected(sec, nanosec):
     with pytest.raises(InputError, match=f"stamp {sec} s {nanosec} ns is not a time"):
         messages.stamp_ns(Time(sec=sec, nanosec=nanosec))
 
 
-def test_numbers_stand_where_the_axes_say():
-    """Element by element; what the subtask has no axis for is zero, rotations are identities."""
+def test_numbers_are_placed_by_axis():
+    """Axes that the subtask does not have are zero, and rotations are identities."""
     message = trajectory()
     assert (message.header.frame_id, messages.stamp_ns(message.header.stamp)) == ("world", STAMP)
     assert message.joint_names == list(EDGES)
@@ -89,8 +89,8 @@ def test_numbers_stand_where_the_axes_say():
 
 @pytest.mark.parametrize("orders", [1, 2, 3])
 @pytest.mark.parametrize("codec", [PAIR, ONE], ids=lambda codec: codec.name)
-def test_references_come_back_as_they_went(codec, orders, monkeypatch):
-    """What the codec wrote is read in place, without the middleware."""
+def test_encoded_references_are_decoded_exactly(codec, orders, monkeypatch):
+    """Encoded references are read in place, without the middleware."""
     monkeypatch.setattr(cdr, "deserialize_message", None)
     expected = motion(codec, orders)
     assert_motion(codec.decode(codec.encode(STAMP, *expected)), expected)
@@ -108,7 +108,7 @@ def test_references_of_the_middleware_are_read_in_place(count, orders, monkeypat
     assert_motion(codec.decode(data), motion(codec, orders))
 
 
-def test_elements_may_come_in_any_order():
+def test_elements_may_be_in_any_order():
     message = trajectory()
     message.joint_names = message.joint_names[::-1]
     for name in ("transforms", "velocities", "accelerations"):
@@ -161,31 +161,31 @@ BAD_REFERENCES = [
 
 
 @pytest.mark.parametrize(("path", "value", "reason"), BAD_REFERENCES)
-def test_bad_references_are_refused_with_a_reason(path, value, reason):
-    """In place or by the middleware, the same reference is refused for the same reason."""
+def test_invalid_references_are_rejected(path, value, reason):
+    """The reason is the same in place and by the middleware."""
     message = changed(trajectory(), path, value)
     for read in (PAIR.reference, lambda m: PAIR.decode(serialize_message(m))):
-        with pytest.raises(InputError) as refused:
+        with pytest.raises(InputError) as rejected:
             read(message)
-        assert str(refused.value).startswith(reason)
+        assert str(rejected.value).startswith(reason)
 
 
 @pytest.mark.parametrize("path", ["header.frame_id", "header.stamp.sec"])
-def test_bad_markers_are_refused(path):
+def test_invalid_markers_are_rejected(path):
     message = deserialize_message(PAIR.encode_marker(STAMP), MultiDOFJointTrajectory)
     changed(message, path, "map" if path.endswith("id") else -1)
     with pytest.raises(InputError):
         PAIR.decode(serialize_message(message))
 
 
-def test_bytes_that_are_no_reference_are_refused():
+def test_bytes_of_another_message_are_rejected():
     data = PAIR.encode(STAMP, *motion())
     for broken in (b"", data[:100], b"\xff" * 300, data[:-1]):
         with pytest.raises(InputError, match="the bytes are not a MultiDOFJointTrajectory"):
             PAIR.decode(broken)
 
 
-def test_rotations_of_nearly_unit_length_pass():
+def test_rotations_of_nearly_unit_length_are_accepted():
     message = changed(trajectory(), "points.0.transforms.0.rotation.w", 1.0 + 9e-4)
     assert_motion(PAIR.decode(serialize_message(message)), motion())
 
@@ -207,7 +207,7 @@ def test_single_inputs_are_read_on_the_axes_of_the_subtask(read, kind, linear, a
 
 
 @pytest.mark.parametrize(("read", "kind", "linear", "angular"), INPUTS)
-def test_bad_single_inputs_are_refused(read, kind, linear, angular):
+def test_invalid_single_inputs_are_rejected(read, kind, linear, angular):
     for path, value, reason in (
         (f"{linear}.y", NAN, "y is nan"),
         (f"{linear}.z", INF, "z is inf"),
@@ -220,12 +220,12 @@ def test_bad_single_inputs_are_refused(read, kind, linear, angular):
 
 
 @pytest.mark.parametrize(("field", "value"), [("w", 0.0), ("w", 0.99), ("y", 0.1)])
-def test_a_pose_whose_quaternion_is_not_one_is_refused(field, value):
+def test_quaternions_without_unit_length_are_rejected(field, value):
     with pytest.raises(InputError, match="rotation of cooperative is not a unit quaternion"):
         ONE.target(stamped(PoseStamped, f"pose.orientation.{field}", value))
 
 
-def test_subtasks_of_several_elements_take_references_only():
+def test_subtasks_with_several_elements_accept_references_only():
     for read, kind in ((PAIR.target, PoseStamped), (PAIR.rate, TwistStamped)):
         with pytest.raises(InputError, match="relative has 2: use `reference`"):
             read(stamped(kind))
@@ -233,7 +233,7 @@ def test_subtasks_of_several_elements_take_references_only():
         PAIR.force(stamped(WrenchStamped))
 
 
-def test_a_force_goes_and_comes_back():
+def test_forces_are_converted_exactly():
     message = deserialize_message(ONE.encode_wrench(STAMP, np.array([3.0, -4.0])), WrenchStamped)
     assert message.header.frame_id == "world"
     stamp, force = ONE.force(message)
@@ -242,14 +242,14 @@ def test_a_force_goes_and_comes_back():
 
 
 @pytest.mark.parametrize(("frame", "axes"), [("world", "world"), ("", "world"), ("hand", "tool")])
-def test_pushes_say_their_axes(frame, axes):
+def test_the_axes_of_a_push_are_those_of_its_frame(frame, axes):
     message = changed(wrench_of([1, 2, 3, 4, 5, 6]), "header.frame_id", frame)
     stamp, found, wrench = messages.push(message, "hand")
     assert (stamp, found, wrench.tolist()) == (STAMP, axes, [1, 2, 3, 4, 5, 6])
 
 
-def test_bad_pushes_are_refused():
-    """An unknown frame is refused with both valid ones named, a number with its place."""
+def test_invalid_pushes_are_rejected():
+    """The reason has both allowed frames, or the name of the number."""
     with pytest.raises(InputError, match=r"frame 'map' is unknown, allowed: world \| hand"):
         messages.push(changed(wrench_of(np.zeros(6)), "header.frame_id", "map"), "hand")
     with pytest.raises(InputError, match="torque y is nan"):
@@ -258,7 +258,7 @@ def test_bad_pushes_are_refused():
         messages.push(changed(wrench_of(np.zeros(6)), "header.stamp.nanosec", 10**9), "hand")
 
 
-def test_external_wrenches_are_in_the_world():
+def test_external_wrenches_are_in_the_world_frame():
     stamp, wrench = messages.external_wrench(wrench_of([1, 2, 3, 4, 5, 6]))
     assert (stamp, wrench.tolist()) == (STAMP, [1, 2, 3, 4, 5, 6])
     with pytest.raises(InputError, match="force z is inf"):
@@ -267,7 +267,7 @@ def test_external_wrenches_are_in_the_world():
         messages.external_wrench(changed(wrench_of(np.zeros(6)), "header.frame_id", "hand"))
 
 
-def test_energies_have_names():
+def test_energies_have_labels():
     data = EnergyCodec(["storage", "its rate", "tank"]).encode(np.array([1.0, -2.0, 3.5]))
     message = deserialize_message(data, Float64MultiArray)
     assert [(d.label, d.size, d.stride) for d in message.layout.dim] == [
@@ -279,7 +279,7 @@ def test_energies_have_names():
 
 
 def test_diagnostics_carry_level_and_values():
-    """The level is a byte, as the message wants it; a publisher accepts the whole."""
+    """The level is a byte, as the message definition requires."""
     status = messages.to_status(
         "controller", Level.WARN, "late", {"period": 0.00123456789, "n": 3}
     )

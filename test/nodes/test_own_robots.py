@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The controller on topics of each robot: exact together, good apart, still if one is late."""
+"""Controller with topics for each robot: equal, different and late stamps."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -23,8 +23,8 @@ from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import SubtaskCodec
 from noninteract_ros.scenario import Scenario
 
-# The clock on the wall decides nothing in these tests.
-PATIENT = {"state_timeout": 1000.0}
+# Wall time has no effect in these tests.
+NO_TIMEOUT = {"state_timeout": 1000.0}
 
 
 @pytest.fixture
@@ -33,7 +33,7 @@ def make_arms(ros: Ros) -> Iterator[Any]:
     made: list[SteppedController] = []
 
     def make(**changes: Any) -> SimulatedArms:
-        arms = SimulatedArms(ros, own_robots(**(PATIENT | changes)))
+        arms = SimulatedArms(ros, own_robots(**(NO_TIMEOUT | changes)))
         made.append(arms.controller)
         return arms
 
@@ -42,9 +42,9 @@ def make_arms(ros: Ros) -> Iterator[Any]:
         controller.destroy_node()
 
 
-def test_equal_stamps_are_the_single_topic_to_the_bit(ros: Ros) -> None:
+def test_equal_stamps_are_equivalent_to_a_single_topic(ros: Ros) -> None:
     """States received by robot, in any order, give the same commands as those on one topic."""
-    values = own_robots(**PATIENT)
+    values = own_robots(**NO_TIMEOUT)
     apart, together = (
         stepped_controller(ros, values),
         stepped_controller(ros, with_team_topics(values)),
@@ -79,14 +79,14 @@ def test_equal_stamps_are_the_single_topic_to_the_bit(ros: Ros) -> None:
 
 
 class Human:
-    """Source that leads the centre of the grasp there and back, at up to 0.5 m/s."""
+    """Human source that moves the centre of the grasp back and forth at up to 0.5 m/s."""
 
     def __init__(self, arms: SimulatedArms) -> None:
         task = arms.stack.subtasks[0]
         self._arms, self._codec = arms, SubtaskCodec(task.name, task.elements, task.axes)
         self._start = arms.stack.evaluate(arms.team.state(arms.team.q0, np.zeros(4))).x[:2]
 
-    def lead(self, now: float) -> None:
+    def publish(self, now: float) -> None:
         """Deliver the reference of the centre at a time [s]."""
         w, along = 2.0 * np.pi / 0.8, np.array([0.04, -0.05])
         shape = np.array([1.0 - np.cos(w * now), w * np.sin(w * now), w**2 * np.cos(w * now)])
@@ -109,7 +109,7 @@ def run(arms: SimulatedArms, age: int) -> tuple[float, float]:
         if tick % 2 == 0:
             arms.publish_states("left")
             arms.controller.receive(arms.drivers["right"].states_topic, states[max(0, tick - age)])
-            human.lead(arms.simulation.now)
+            human.publish(arms.simulation.now)
             arms.run_controller()
         v = arms.simulation.v
         arms.step()
@@ -121,13 +121,13 @@ def run(arms: SimulatedArms, age: int) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("prediction", ["velocity", "acceleration"])
-def test_states_of_different_times_cost_what_the_prediction_does(
+def test_errors_of_unequal_stamps_are_those_of_the_prediction(
     make_arms: Any, prediction: str
 ) -> None:
-    """Constant velocity lets D / K times the velocity's error through; acceleration far less.
+    """Constant velocity causes D / K times the velocity error; acceleration much less.
 
-    The velocity of an arm with 1 m of reach is wrong by up to a d; in a slow motion the relative
-    spring gives way to the damper's force by D / K of it.
+    The velocity of an arm with a reach of 1 m is wrong by up to a d. In a slow motion the damper
+    force of this error displaces the relative spring by D / K of it.
     """
     changes = {"state_prediction": prediction, "cooperative": {"takeover": "direct"}}
     floor, _ = run(make_arms(**changes), 0)
@@ -145,12 +145,12 @@ def test_states_of_different_times_cost_what_the_prediction_does(
         np.testing.assert_allclose(np.array(errors) / errors[0], [1.0, 3.0, 6.0], rtol=0.03)
 
 
-def test_a_late_robot_holds_the_whole_team_until_it_is_back(make_arms: Any) -> None:
-    """Who is late is said; the others brake; nobody is pulled when it returns."""
+def test_a_late_robot_holds_the_whole_team(make_arms: Any) -> None:
+    """Diagnostics name the late robot, the others brake, and its return moves no robot."""
     arms = make_arms(cooperative={"takeover": "direct"})
     human = Human(arms)
     for tick in range(300):
-        human.lead(1e-3 * tick)
+        human.publish(1e-3 * tick)
         arms.publish_states("left", "right")
         arms.run_controller()
         arms.step()
@@ -158,7 +158,7 @@ def test_a_late_robot_holds_the_whole_team_until_it_is_back(make_arms: Any) -> N
     assert np.abs(arms.simulation.v[:2]).max() > 0.1
     assert arms.status()[0] < 2
     for tick in range(300, 700):
-        human.lead(1e-3 * tick)
+        human.publish(1e-3 * tick)
         arms.publish_states("left")
         arms.run_controller()
         expected = (2, "holding: states of right are more than 20 ms older than the others")
@@ -180,8 +180,8 @@ def test_a_late_robot_holds_the_whole_team_until_it_is_back(make_arms: Any) -> N
     assert arms.status()[1].startswith("holding cooperative, relative: source silent")
 
 
-def test_a_hitch_is_waited_out(make_arms: Any) -> None:
-    """After a silence of all somebody is heard first: the other is waited for, nobody stopped."""
+def test_a_pause_of_all_robots_does_not_hold_the_team(make_arms: Any) -> None:
+    """The first state after a pause waits for the other robot, without a hold."""
     arms = make_arms()
     arms.publish_states("left", "right")
     arms.run_controller()
@@ -195,8 +195,8 @@ def test_a_hitch_is_waited_out(make_arms: Any) -> None:
         assert arms.status()[0] < 2
 
 
-def test_a_stop_that_was_asked_for_outlasts_a_late_robot(make_arms: Any) -> None:
-    """What a person stopped stays stopped."""
+def test_a_requested_stop_persists_after_a_late_robot(make_arms: Any) -> None:
+    """Only the resume service ends a requested stop."""
     arms = make_arms()
     for tick in range(100):
         arms.publish_states("left", *(("right",) if not 20 <= tick < 80 else ()))
@@ -209,8 +209,8 @@ def test_a_stop_that_was_asked_for_outlasts_a_late_robot(make_arms: Any) -> None
     assert arms.status() == (1, "stopped")
 
 
-def test_before_every_robot_has_spoken_nothing_is_commanded(make_arms: Any) -> None:
-    """Who has not is named; an arm of which one joint is missing has not."""
+def test_nothing_is_commanded_before_all_robots_have_a_state(make_arms: Any) -> None:
+    """Diagnostics name robots without a state, including those with a missing joint."""
     arms = make_arms()
     arms.publish_states("left")
     arms.run_controller()
@@ -227,8 +227,8 @@ def test_before_every_robot_has_spoken_nothing_is_commanded(make_arms: Any) -> N
     assert len(arms.controller.published["/team/joint_commands"]) == 1
 
 
-def test_without_states_torques_fade_to_gravity(make_arms: Any) -> None:
-    """No torque of a motion stays in force where the states of all robots have stopped."""
+def test_torques_fade_to_gravity_without_states(make_arms: Any) -> None:
+    """No motion torque stays in force after the states of all robots have stopped."""
     arms = make_arms(state_timeout=0.05, transition_time=0.05)
     arms.simulation.v = np.array([0.3, -0.2, 0.1, 0.4])
     for _ in range(20):

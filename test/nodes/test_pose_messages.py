@@ -24,15 +24,15 @@ VALUES = {
 
 
 def motion(codec: SubtaskCodec, orders: int) -> list[np.ndarray]:
-    """Value, velocity, acceleration; no two numbers of the rates alike."""
+    """Return value, velocity, acceleration, all numbers of the rates different."""
     dim = codec.layout.dim
     return [VALUES[codec], 10.0 + np.arange(dim), 30.0 + np.arange(dim)][:orders]
 
 
 @pytest.mark.parametrize("orders", [1, 2, 3])
 @pytest.mark.parametrize("codec", VALUES, ids=lambda codec: codec.name)
-def test_references_come_back_as_they_went(codec, orders, monkeypatch):
-    """In place and by the middleware."""
+def test_encoded_references_are_decoded_exactly(codec, orders, monkeypatch):
+    """The values are the same in place and by the middleware."""
     expected = motion(codec, orders)
     data = codec.encode(STAMP, *expected)
     message = deserialize_message(data, MultiDOFJointTrajectory)
@@ -46,8 +46,8 @@ def test_references_come_back_as_they_went(codec, orders, monkeypatch):
         assert rows[orders:] == [None] * (3 - orders)
 
 
-def test_numbers_stand_where_the_message_says():
-    """Quaternions are the transforms' rotations, angular parts those of the twists."""
+def test_rotations_and_angular_rates_are_placed_by_element():
+    """Quaternions are the rotations of transforms, angular rates those of twists."""
     message = deserialize_message(PAIRS.encode(STAMP, *motion(PAIRS, 3)), MultiDOFJointTrajectory)
     (point,) = message.points
     moves = [(t.translation.x, t.translation.y, t.translation.z) for t in point.transforms]
@@ -60,8 +60,8 @@ def test_numbers_stand_where_the_message_says():
     assert point.accelerations[0].angular.z == 34
 
 
-def test_quaternions_are_brought_to_unit_length():
-    """A quaternion that is nearly a unit one is taken, at unit length; others are refused."""
+def test_quaternions_are_normalized():
+    """A quaternion of nearly unit length is normalized; others are rejected."""
     data = POSE.encode(STAMP, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.6, 0.8004]))
     found = POSE.decode(data).position
     assert np.linalg.norm(found[3:]) == pytest.approx(1.0, abs=1e-15)
@@ -71,7 +71,7 @@ def test_quaternions_are_brought_to_unit_length():
 
 
 def test_single_inputs_have_orientations_and_torques():
-    """Set-points, rates and wrenches of a pose have all their parts."""
+    """Set-points, rates and wrenches of a pose are read completely."""
     target = PoseStamped()
     target.pose.position.z = 3.0
     orientation = target.pose.orientation
@@ -88,10 +88,10 @@ def test_single_inputs_have_orientations_and_torques():
 
 
 def test_feedback_has_a_torque():
-    """What a device feels of a pose is a force and a torque."""
+    """The feedback of a pose has a force and a torque."""
     for codec, expected in ((POSE, [1, 2, 3, 4, 5, 6]), (TURN, [0, 0, 0, 1, 2, 3])):
-        felt = np.arange(1.0, codec.layout.dim + 1.0)
-        message = deserialize_message(codec.encode_wrench(STAMP, felt), WrenchStamped)
+        feedback = np.arange(1.0, codec.layout.dim + 1.0)
+        message = deserialize_message(codec.encode_wrench(STAMP, feedback), WrenchStamped)
         force, torque = message.wrench.force, message.wrench.torque
         assert [force.x, force.y, force.z, torque.x, torque.y, torque.z] == expected
-        np.testing.assert_array_equal(codec.force(message)[1], felt)
+        np.testing.assert_array_equal(codec.force(message)[1], feedback)
