@@ -6,7 +6,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Mapping
-from dataclasses import is_dataclass
+from dataclasses import dataclass, is_dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ import pytest
 import scenario_reference
 import structure
 import yaml
-from documents import Block, blocks, codes, tables
+from documents import Block, blocks, codes, documents, tables
 from harness import merged
 from repository import ROOT, programs
 
@@ -29,7 +29,7 @@ from noninteract_ros.errors import ScenarioError
 from noninteract_ros.nodes.recording.recorder import PARAMETERS as RECORDER_PARAMETERS
 from noninteract_ros.scenario.files import nest, read_parameters
 from noninteract_ros.scenario.scenario import Scenario
-from noninteract_ros.schema import keys_of
+from noninteract_ros.schema import key
 from noninteract_ros.team.models.urdf_files import read_urdf
 from noninteract_ros.validation.check import CheckSettings, run_check
 
@@ -123,7 +123,7 @@ def test_code_runs(block: Block) -> None:
 def test_languages_are_known() -> None:
     """Every fenced block is checked by a test, or is plain text."""
     fences = re.compile(r"^ *```(.*)$", re.MULTILINE)
-    for file in {block.file for block in blocks("sh")}:
+    for file in documents():
         opened = fences.findall(file.read_text())[::2]
         assert set(opened) <= {"sh", "yaml", "python", "text"}, file
 
@@ -191,21 +191,18 @@ def test_every_block_is_in_the_reference() -> None:
         assert len(rows) == len(list(scenario_reference.own_keys(block)))
 
 
-def test_key_without_a_text_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A key that says nothing of itself has no place in the reference."""
-    item = next(keys_of(scenario_reference.BLOCKS["tank"]))
-    silent = type(item.metadata["key"])("")
-    monkeypatch.setitem(scenario_reference.BLOCKS, "tank", scenario_reference.BLOCKS["tank"])
-    monkeypatch.setattr(
-        scenario_reference, "own_keys", lambda _: [_with(item, metadata={"key": silent})]
-    )
-    with pytest.raises(ValueError, match="no text"):
-        scenario_reference.table("tank")
+@dataclass(frozen=True)
+class Silent:
+    """A block with a key that has no text."""
+
+    value: float = key("")
 
 
-def _with(item: Any, metadata: Mapping[str, Any]) -> Any:
-    """Return a stand-in for a dataclass field with other metadata."""
-    return type("Field", (), {"name": item.name, "default": item.default, "metadata": metadata})
+def test_key_without_a_text_is_rejected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The reference cannot be made while a key has no text."""
+    monkeypatch.setitem(scenario_reference.BLOCKS, "silent", Silent)
+    with pytest.raises(ValueError, match=r"silent\.value has no text"):
+        scenario_reference.table("silent")
 
 
 def test_table_of_programs_is_complete() -> None:
