@@ -6,7 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -19,6 +18,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
+from waiting import DEADLINE, until
 
 from noninteract_ros.errors import RecordingError
 from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
@@ -29,7 +29,6 @@ from noninteract_ros.reporting.recording.run import Run
 
 WORKER = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0")[2:])
 DOMAIN = 60 + WORKER % 10
-DEADLINE = 30.0
 TICKS = 1000
 TOPICS = ("joint_states", "joint_commands", "cooperative/state")
 
@@ -121,10 +120,7 @@ def test_the_file_of_a_killed_recorder_can_be_repaired(
     publisher = start("-c", PUBLISHER)
     assert publisher.stdout is not None
     assert publisher.stdout.readline() == "publishing\n"
-    deadline = time.monotonic() + DEADLINE
-    while path.stat().st_size < 10_000:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    until(lambda: path.stat().st_size >= 10_000, "a recording")
     recorder.kill()
     recorder.wait(DEADLINE)
     with pytest.raises(RecordingError, match="noninteract repair"):
@@ -212,11 +208,11 @@ def ros() -> Iterator[tuple[Any, Callable[..., RecorderNode]]]:
 
 
 def poll_until(recorder: RecorderNode, done: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + DEADLINE
-    while not done():
-        assert time.monotonic() < deadline
+    def polled() -> bool:
         recorder.poll()
-        time.sleep(0.002)
+        return done()
+
+    until(polled)
 
 
 def test_only_topics_of_the_namespace_are_recorded(ros: Any, tmp_path: Path) -> None:
@@ -231,6 +227,7 @@ def test_only_topics_of_the_namespace_are_recorded(ros: Any, tmp_path: Path) -> 
     poll_until(recorder, lambda: recorder.writer.topics == 2)
     recorder.finish()
     assert set(Run.open(tmp_path).topics) == {"/team/late/topic", "/diagnostics"}
+    assert other.get_subscription_count() == 0
 
 
 def test_best_effort_publishers_are_recorded(ros: Any, tmp_path: Path) -> None:
