@@ -124,7 +124,7 @@ def test_unstable_laws_and_gains_are_rejected(ros: Ros) -> None:
     assert change(ros, relative__damping=[280.0, 280.0]) == (True, "")
     ok, reason = change(ros, law="natural")
     assert not ok
-    assert "law natural, all subtasks: held over a tick of 5 ms" in reason
+    assert "law natural, all subtasks: with the torque held over a tick of 5 ms" in reason
     assert "of its damping" in reason
     assert not change(ros, law="energy_gated")[0]
     assert not change(ros, relative__damping=[310.0, 310.0])[0]
