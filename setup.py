@@ -21,8 +21,14 @@ PROGRAMS = {node: f"{NAME}.nodes.{room}.{node}:main" for node, room in NODES.ite
 PROGRAMS["noninteract"] = f"{NAME}.cli:main"
 ROBOTS = ["example-robot-data>=6.0"]  # Models of arms: 130 MB to download, 440 MB on disk.
 PEER = ["mujoco>=4.0"]  # Another simulator's dynamics, to test against: 20 MB to download.
+RUFF = ["ruff>=0.17,<0.18"]  # Another minor release formats differently.
 # MkDocs 2 drops plugins and themes, and Material is made for MkDocs 1 alone.
-DOCS = ["mkdocs>=1.6.1,<2", "mkdocs-material>=9.7.5,<10", "mkdocstrings[python]>=1.0,<2"]
+DOCS = [
+    "mkdocs>=1.6.1,<2",
+    "mkdocs-material>=9.7.5,<10",
+    "mkdocstrings[python]>=1.0,<2",
+    *RUFF,  # Breaks the lines of signatures.
+]
 
 setup(
     name=NAME,
@@ -69,7 +75,6 @@ setup(
             *ROBOTS,
             *PEER,
             *DOCS,
-            "ruff>=0.17,<0.18",  # Another minor release formats differently.
             "mypy>=2.4",
             "playwright>=1.60",  # Drives the console's page in Chromium, where that is installed.
             "pytest>=9.2",
