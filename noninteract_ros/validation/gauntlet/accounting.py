@@ -7,8 +7,8 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.validation.gauntlet.account import compiled_account
 from noninteract_ros.validation.gauntlet.arrays import TeamArrays, compiled, copy
 from noninteract_ros.validation.gauntlet.law import (
+    GRAVITATIONAL,
     KINETIC,
-    LIFTED,
     Terms,
     complete_force,
     impedance_force,
@@ -51,7 +51,7 @@ def book(
         beyond += applied[1, i] * step
         error += (applied[0, i] + applied[1, i]) * (step - elapsed * memory.v_received[i])
     meter.naive[0] += error
-    natural -= terms.energies[LIFTED] - memory.received[1]
+    natural -= terms.energies[GRAVITATIONAL] - memory.received[1]
     impedance_force(team, terms, 1.0, memory.force[0])
     complete_force(team, terms, law == PAPER, memory.force[0], memory.force[1])
     demand = power(team, terms, memory.force[1])
@@ -65,7 +65,7 @@ def store_state(team: TeamArrays, terms: Terms, memory: Memory, now: float) -> N
     """Store the received state."""
     copy(memory.q, memory.q_received)
     copy(memory.v, memory.v_received)
-    memory.received[0], memory.received[1] = now, terms.energies[LIFTED]
+    memory.received[0], memory.received[1] = now, terms.energies[GRAVITATIONAL]
 
 
 @compiled

@@ -32,7 +32,7 @@ GRAVITY = 9.81  # [m/s^2]
 
 @dataclass(frozen=True)
 class Case:
-    """Complete case.
+    """One case: team, gains, environment and initial state.
 
     Attributes:
         index: Number of the case.
@@ -41,7 +41,7 @@ class Case:
         elements: Elements of the environment.
         start: q and v at the start, robots first, shape (2, m).
         robots: Number of robots.
-        axes: Axes of each.
+        axes: Number of axes of each robot.
     """
 
     index: int

@@ -24,15 +24,15 @@ from noninteract_ros.validation.gauntlet.arrays import (
 )
 from noninteract_ros.validation.gauntlet.planar import (
     arm_coriolis,
+    arm_gravitational_energy,
     arm_gravity,
     arm_inertia,
     arm_jacobian,
     arm_jacobian_rate,
-    arm_lifted,
     arm_tool,
 )
 
-KINETIC, LIFTED = 0, 1  # places in `energies`
+KINETIC, GRAVITATIONAL = 0, 1  # places in `energies`
 
 
 class Terms(NamedTuple):
@@ -132,7 +132,7 @@ def arms_at(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
 @compiled
 def at_tools(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
     """Write tool matrices, tool coordinates (into spare), gravity and energies of arms."""
-    terms.energies[KINETIC] = terms.energies[LIFTED] = 0.0
+    terms.energies[KINETIC] = terms.energies[GRAVITATIONAL] = 0.0
     for i in range(len(team.arms)):
         at = 2 * i
         J, M = arm_jacobian(team.arms, i, q), arm_inertia(team.arms, i, q)
@@ -149,7 +149,7 @@ def at_tools(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
         terms.gravity[at], terms.gravity[at + 1] = arm_gravity(team.arms, i, q)
         w = v[at] * M[0] + v[at + 1] * M[2], v[at] * M[1] + v[at + 1] * M[3]
         terms.energies[KINETIC] += 0.5 * (w[0] * v[at] + w[1] * v[at + 1])
-        terms.energies[LIFTED] += arm_lifted(team.arms, i, q)
+        terms.energies[GRAVITATIONAL] += arm_gravitational_energy(team.arms, i, q)
 
 
 @compiled

@@ -17,7 +17,7 @@ def plant_of(case: Case, period: float) -> PlantArrays:
     inertia = case.around.inertia.copy()
     inertia[:n, :n] += np.diag(case.team.masses)
     substeps = max(1, round(SUBSTEPS * period / 1e-3))
-    room = tuple(np.zeros((8, m)))
+    vectors = tuple(np.zeros((8, m)))
     square = np.zeros((m, m)), np.zeros((m, m))
     long = np.zeros(2 * m + n + 1), np.zeros(2 * m)
     contacts = np.zeros(len(case.around.gaps)), np.zeros(len(case.around.gaps))
@@ -31,7 +31,9 @@ def plant_of(case: Case, period: float) -> PlantArrays:
         system = 2.0 / h * inertia + case.around.damping + 0.5 * h * case.around.stiffness
         response = np.linalg.inv(system)
     kind = ARMS if case.arms else LINEAR if case.linear else CONTACT
-    return PlantArrays(kind, substeps, tick, loss, response, inertia, room, long, square, contacts)
+    return PlantArrays(
+        kind, substeps, tick, loss, response, inertia, vectors, long, square, contacts
+    )
 
 
 def held(case: Case, inertia: Array, period: float) -> tuple[Array, Array]:

@@ -35,7 +35,7 @@ def arm_gravity(arms: Array, i: int, q: Array) -> tuple[float, float]:
 
 
 @compiled
-def arm_lifted(arms: Array, i: int, q: Array) -> float:
+def arm_gravitational_energy(arms: Array, i: int, q: Array) -> float:
     """Return the gravitational energy [J]."""
     return float(arms[i, 5] * np.sin(q[2 * i]) + arms[i, 6] * np.sin(q[2 * i] + q[2 * i + 1]))
 

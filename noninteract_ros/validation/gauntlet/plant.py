@@ -49,7 +49,7 @@ class PlantArrays(NamedTuple):
         loss: Heat of a tick as a quadratic form of w.
         response: Midpoint velocity by impulse over a substep, shape (m, m).
         inertia: Robots, carried masses and bodies, shape (m, m); of arms without the arms.
-        room: Work space for vectors, shape (m,) each.
+        vectors: Work space for vectors, shape (m,) each.
         long: Work space for w and its image.
         square: Work space for matrices, shape (m, m) each.
         contacts: Work space for force and depth of each contact.
@@ -61,7 +61,7 @@ class PlantArrays(NamedTuple):
     loss: Array
     response: Array
     inertia: Array
-    room: tuple[Array, ...]
+    vectors: tuple[Array, ...]
     long: tuple[Array, Array]
     square: tuple[Array, Array]
     contacts: tuple[Array, Array]
@@ -103,7 +103,12 @@ def contact_tick(
 ) -> float:
     """Advance a plant with unilateral contacts by one tick in place; return the heat [J]."""
     h, heat, m, n = T / plant.substeps, 0.0, len(z), len(torque)
-    push, load, middle, spring = plant.room[0], plant.room[1], plant.room[2], plant.room[3]
+    push, load, middle, spring = (
+        plant.vectors[0],
+        plant.vectors[1],
+        plant.vectors[2],
+        plant.vectors[3],
+    )
     forces, depth = plant.contacts
     for _ in range(plant.substeps):
         multiply(plant.inertia, z_rate, push)
@@ -176,7 +181,7 @@ def arms_acceleration(
     acceleration: Array,
 ) -> float:
     """Write the acceleration of joints and bodies; return the dissipated power [W]."""
-    z, z_rate, bias, force = plant.room[0], plant.room[1], plant.room[2], plant.room[3]
+    z, z_rate, bias, force = plant.vectors[0], plant.vectors[1], plant.vectors[2], plant.vectors[3]
     J, M = plant.square
     tool_motion(team, q, v, z, z_rate, J, bias)
     touching(around, z, force)
@@ -210,7 +215,7 @@ def arms_tick(
 ) -> float:
     """Advance planar arms by one tick in place (classical Runge-Kutta); return the heat [J]."""
     h, heat, m = T / plant.substeps, 0.0, len(q)
-    at, rate, slope = plant.room[4], plant.room[5], plant.room[6]
+    at, rate, slope = plant.vectors[4], plant.vectors[5], plant.vectors[6]
     q_sum, v_sum = plant.long
     for _ in range(plant.substeps):
         for i in range(m):
@@ -252,10 +257,10 @@ def environment_energy(
     plant: PlantArrays, team: TeamArrays, around: SurroundingsArrays, q: Array, v: Array
 ) -> tuple[float, float]:
     """Return potential and kinetic energy of the environment [J]."""
-    z, z_rate = plant.room[0], plant.room[1]
+    z, z_rate = plant.vectors[0], plant.vectors[1]
     if plant.kind == ARMS:
-        tool_motion(team, q, v, z, z_rate, plant.square[0], plant.room[2])
+        tool_motion(team, q, v, z, z_rate, plant.square[0], plant.vectors[2])
     else:
         copy(q, z)
         copy(v, z_rate)
-    return touching(around, z, plant.room[3]), 0.5 * quadratic(around.inertia, z_rate)
+    return touching(around, z, plant.vectors[3]), 0.5 * quadratic(around.inertia, z_rate)

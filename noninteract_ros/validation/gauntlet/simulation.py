@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sampled loop of one case in compiled form: law, account, delay, lost states and plant."""
+"""Compiled simulation of one case: law, energy account, delay, lost states and plant."""
 
 from typing import Any
 
@@ -23,8 +23,8 @@ from noninteract_ros.validation.gauntlet.arrays import (
     multiply_transposed,
 )
 from noninteract_ros.validation.gauntlet.law import (
+    GRAVITATIONAL,
     KINETIC,
-    LIFTED,
     Terms,
     complete_force,
     impedance_force,
@@ -80,7 +80,7 @@ def update_meter(meter: Meter, tank: Any, speed: float) -> None:
 def verdict_of(
     team: TeamArrays, terms: Terms, memory: Memory, k: int, limits: Limits, meter: Meter
 ) -> int:
-    """Return the state of the case after k ticks; UNSETTLED while undecided."""
+    """Return the outcome of the case after k ticks; UNSETTLED while undecided."""
     now = terms.energies[KINETIC] + memory.environment[0] + memory.environment[1]
     if not now <= limits.growth * (memory.began[0] + memory.began[1]):
         return UNBOUNDED
@@ -110,7 +110,7 @@ def move(
     n = team.n
     before = (
         terms.energies[KINETIC]
-        + terms.energies[LIFTED]
+        + terms.energies[GRAVITATIONAL]
         + memory.environment[0]
         + memory.environment[1]
     )
@@ -124,7 +124,7 @@ def move(
     )
     after = (
         terms.energies[KINETIC]
-        + terms.energies[LIFTED]
+        + terms.energies[GRAVITATIONAL]
         + memory.environment[0]
         + memory.environment[1]
     )
@@ -190,14 +190,14 @@ def run(
         team: The robots.
         around: Environment.
         plant: Dynamics of robots and environment.
-        terms: Terms of `law.new_terms`.
+        terms: Work space for the terms of the law, from `law.new_terms`.
         law: NATURAL, NONINTERACTING, PAPER or GATED.
         settings: Settings of the account.
-        withheld: The same without refilling, for the torques before the first command.
+        withheld: Settings without refilling, for the torques before the first command.
         link: Delay and losses between states and torques.
         limits: Limits of the simulation.
-        memory: Memory of `new_memory`.
-        meter: Meter of `new_meter`.
+        memory: State of the loop, from `new_memory`.
+        meter: Measurements, from `new_meter`.
         trace: Rows to fill, shape (rows, TRACED + 2 m + n).
         stride: Ticks from row to row.
 

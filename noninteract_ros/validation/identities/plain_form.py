@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The law as written in the paper, alpha + Gamma tau~_c: reference for the inverse dynamics."""
+"""Torques of the laws in the form of the paper, alpha + Gamma tau~_c, for comparison only."""
 
 import numpy as np
 
