@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Energy ports of a connection, and projections of efforts onto energy limits."""
+"""Energy ports of a link, and projections of efforts onto energy limits."""
 
 import numpy as np
 from scipy.optimize import brentq
@@ -13,8 +13,8 @@ class Port:
     """Energy that has passed a port, counted separately for each direction.
 
     Attributes:
-        absorbed: Energy that entered the connection here, never falling [J].
-        delivered: Energy that left the connection here, never falling [J].
+        absorbed: Energy that entered the link here, never falling [J].
+        delivered: Energy that left the link here, never falling [J].
     """
 
     def __init__(self) -> None:

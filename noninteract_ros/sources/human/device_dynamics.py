@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces on hand and device besides the hand's impedance and the device's motors."""
+"""Mass, damping and workspace boundary of the device, and the operator's delayed correction."""
 
 from collections import deque
 from typing import Protocol
@@ -16,16 +16,16 @@ from noninteract_ros.subtasks.reference import Reference
 TRANSLATIONAL = ("device_mass", "device_damping", "reaction_stiffness")
 
 
-class Offset(Protocol):
-    """A hand with a known deviation of the translational coordinates."""
+class DeviatingHand(Protocol):
+    """Hand whose deviation from the intended motion is known."""
 
     @property
     def offset(self) -> tuple[Array, Array]:
-        """Deviation and its rate, shape (dim,) each [m; m/s]."""
+        """Deviation of the translational coordinates and its rate, shape (p,) each [m; m/s]."""
 
 
 class DeviceDynamics:
-    """Mass and damping of the device, workspace boundary, and the operator's delayed correction.
+    """Forces on hand and device besides the hand's impedance.
 
     The hand's impedance pulls hand and device towards the intended motion x_i. The device adds its
     mass m_d and damping b_d. The deviation e from the intended motion obeys
@@ -40,14 +40,14 @@ class DeviceDynamics:
     Args:
         settings: Block `haptic` of the scenario.
         centre: Centre of the workspace, shape (p,) [m].
-        places: Indices of the translational coordinates in a velocity and in a value.
+        indices: Indices of the translational coordinates in a velocity and in a value.
     """
 
     def __init__(
-        self, settings: HapticSettings, centre: Array, places: tuple[Array, Array]
+        self, settings: HapticSettings, centre: Array, indices: tuple[Array, Array]
     ) -> None:
         self._settings, self._centre = settings, centre
-        self._rates, self._values = places
+        self._rates, self._values = indices
         self._half = 0.5 * np.array(settings.workspace) if settings.workspace else np.inf
         self._delay = round(settings.reaction_delay * settings.update_rate)
         self.reset()
@@ -80,11 +80,11 @@ class DeviceDynamics:
         """Discard all past deviations."""
         self._deviations: deque[Array] = deque(maxlen=self._delay + 1)
 
-    def update(self, hand: Offset) -> None:
+    def update(self, hand: DeviatingHand) -> None:
         """Store the current deviation; call once per update period."""
         self._deviations.append(hand.offset[0])
 
-    def force(self, motors: Array, intended: Reference, hand: Offset) -> Array:
+    def force(self, motors: Array, intended: Reference, hand: DeviatingHand) -> Array:
         """Return the total force on hand and device, without the hand's impedance [N; N m].
 
         Args:

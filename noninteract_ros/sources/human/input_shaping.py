@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Conversion of an operator's device inputs to velocities and set-points of a subtask.
 
-This module holds the operator's part: scaling, dead-man's switch, clutch and workspace. Velocity,
-acceleration and jerk are bounded later, where velocities and set-points become references
-(`control/references/desired_motion.py`). Those start from the subtask's current motion, so that
-take-over, release and re-engagement never jump.
+This module has scaling, dead zone, dead-man's switch, clutch and workspace, and no input shaping
+in the sense of vibration suppression. Velocity, acceleration and jerk are bounded later, in the
+controller (`control/references/desired_motion.py`), which starts from the subtask's current
+motion, so that take-over, release and re-engagement never jump.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from noninteract_ros.subtasks.reference import Reference
 from noninteract_ros.subtasks.subtask import Subtask
 
 AXES = ("x", "y", "z")
-LATENCY = 0.06  # Age [s] of a received position when the velocity computed from it acts.
+LATENCY = 0.06  # Time [s] from the stamp of a position to the effect of a velocity based on it.
 
 
 class DeadManSwitch:

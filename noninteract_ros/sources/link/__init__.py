@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Force feedback between an operator's device and the team over a delayed connection."""
+"""Force feedback between an operator's device and the team over a delayed link."""

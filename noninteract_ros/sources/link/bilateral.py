@@ -22,7 +22,7 @@ from noninteract_ros.sources.link.wave_variables import WaveDevice, WaveTeam
 from noninteract_ros.subtasks.layout import Layout
 from noninteract_ros.subtasks.reference import Reference
 
-LONGEST_GAP = 0.1  # Time without samples [s] after which the connection is re-established.
+LONGEST_GAP = 0.1  # Time without samples [s] after which the link is re-established.
 
 ENDS: dict[str, tuple[type[ObservedDevice], type[ObservedTeam]]] = {
     "none": (ObservedDevice, ObservedTeam),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One direction of a connection: packets are delayed, reordered or lost."""
+"""One direction of a link: packets are delayed, reordered or lost."""
 
 import heapq
 from typing import Generic, TypeVar
@@ -13,11 +13,11 @@ TOLERANCE = 1e-9  # Arrivals up to this much later than the requested time count
 
 
 class Channel(Generic[Payload]):
-    """Packets under way; the delay and loss of the n-th one depend on the seed and n alone.
+    """Packets in transit; the delay and loss of the n-th one depend on the seed and n alone.
 
     Args:
         settings: Delay, its spread, losses, and whether packets may overtake each other.
-        direction: Number that distinguishes the two directions of a connection.
+        direction: Number that distinguishes the two directions of a link.
 
     Attributes:
         sent: Count of packets sent.

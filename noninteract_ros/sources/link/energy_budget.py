@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Energy budget of one end of a connection, and the packets that carry energy counts.
+"""Energy budget of one end of a link, and the packets that carry energy counts.
 
 Each end counts the energy that it has absorbed in total. The count never falls and is part of
 every packet. The other end may spend the growth of the largest count received. So a lost packet

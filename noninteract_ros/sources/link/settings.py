@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Settings of the connection between the operator's device and the team."""
+"""Settings of the link between the operator's device and the team."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,7 @@ from noninteract_ros.schema import key
 
 @dataclass(frozen=True)
 class LinkSettings:
-    """Block `link` of a scenario: a two-way connection with delay and loss, made passive."""
+    """Block `link` of a scenario: a two-way channel with delay and loss, made passive."""
 
     delay: float = key("Mean delay one way [s]", 0.0, minimum=0.0, maximum=10.0)
     jitter: float = key(

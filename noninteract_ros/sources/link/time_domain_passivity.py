@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ends of a connection with a passivity observer and a passivity controller each.
+"""Ends of a link with a passivity observer and a passivity controller each.
 
 The device's end responds to a velocity with a force, the team's end to a force with a velocity.
 Each observes the energy at its port, tick by tick with the measured displacement, and delivers no
@@ -34,10 +34,10 @@ def _unlimited(force: Array) -> Array:
 
 
 class ObservedDevice:
-    """Device's end of the connection.
+    """Device's end of the link.
 
     Args:
-        settings: Settings of the connection.
+        settings: Settings of the link.
         metric: Damping of each coordinate relative to that of a translation, shape (p,).
         period: Tick [s].
         saturate: Function that limits a force to the device's force and torque limits.
@@ -71,7 +71,7 @@ class ObservedDevice:
         self._number = 0
 
     def resume(self) -> None:
-        """Re-establish the connection: discard received signals, keep all energies."""
+        """Re-establish the link: discard received signals, keep all energies."""
         self._received = np.zeros_like(self._metric)
 
     def receive(self, packet: Packet) -> None:
@@ -140,10 +140,10 @@ class ObservedDevice:
 
 
 class ObservedTeam:
-    """Team's end of the connection.
+    """Team's end of the link.
 
     Args:
-        settings: Settings of the connection.
+        settings: Settings of the link.
         layout: Layout of the commanded subtask's values.
         metric: Damping of each coordinate relative to that of a translation, shape (p,).
         period: Tick [s].

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Ends of a connection that exchange wave variables instead of force and velocity.
+"""Ends of a link that exchange wave variables instead of force and velocity.
 
-With a diagonal impedance B, the waves of a force F and a velocity v are
+With a diagonal wave impedance B, the waves of a force F and a velocity v are
 
     u = (B v + F) / sqrt(2 B),  w = (B v - F) / sqrt(2 B),  F' v = (u' u - w' w) / 2,
 
@@ -24,7 +24,7 @@ CATCH_UP = 2.0  # Decay rate of a position difference, which waves alone would k
 
 
 class _Waves:
-    """Impedance B of a connection and the root of 2 B, shape (p,) each."""
+    """Wave impedance B of a link and the root of 2 B, shape (p,) each."""
 
     _settings: LinkSettings
     _metric: Array
