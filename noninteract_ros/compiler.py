@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Compilation of functions to machine code, cached until their sources change."""
+"""Compilation of functions by numba, cached on disk until their sources change."""
 
 import hashlib
 from collections.abc import Callable
@@ -24,7 +24,7 @@ def _source_digest(folder: Path) -> bytes:
 
 
 def compiled(function: Function) -> Function:
-    """Compile a function for the types of its first arguments, and cache the machine code.
+    """Compile a function at its first call with each combination of argument types; cache that.
 
     Arithmetic follows IEEE 754 strictly: nothing is reordered or contracted, and a division by
     zero gives inf or NaN, as in numpy. The cache lies beside the source or in the user's cache
@@ -34,7 +34,7 @@ def compiled(function: Function) -> Function:
 
 
 def inner(function: Function) -> Function:
-    """Compile a function that is called from compiled functions only, in half the time."""
+    """Compile a function without an entry point from Python, which halves the compile time."""
     options = {"no_cfunc_wrapper": True, "no_cpython_wrapper": True}
     return _cached(numba.njit(error_model="numpy", **options)(function))
 

@@ -23,8 +23,8 @@ from noninteract_ros.team.team import Team
 def collision_geometry(scenario: Scenario, team: Team) -> CollisionGeometry:
     """Return the bodies of a scenario and the pairs of them that can collide.
 
-    Links are capsules around their collision meshes, or capsules between joints without meshes. A
-    held object moves with the tool of the first robot that holds it.
+    A link is a capsule around its collision meshes, and for robots without meshes a capsule
+    between its joints. A held object moves with the tool of the first robot that holds it.
 
     Raises:
         ScenarioError: The meshes of a URDF cannot be read.

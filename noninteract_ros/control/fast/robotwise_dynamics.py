@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Terms of the law robot by robot, at a cost linear in the number of robots.
+"""Task dynamics robot by robot, at a cost linear in the number of robots.
 
 The stacked Jacobian is J = A T: T has one square block for each robot, which maps its joint
 velocities to its tool's velocity and its chosen joints, and A mixes the tools, see
@@ -11,9 +11,9 @@ which has a block for each robot as well,
 
     mean       M_c = B' L B of the columns B of A^-1, at most six
     joints     M_p has the joints' rows and columns of L, since nothing else moves
-    edges      M_r y = f is the minimum of w' L w / 2 - f' y over all tool motions w that keep
-               the mean, y = A_r w: one block for each robot and as many multipliers as the mean
-               has coordinates
+    edges      M_r^-1 f = A_r w for the tool motion w that keeps the mean and minimises
+               w' L w / 2 - f' A_r w: one block for each robot and as many Lagrange multipliers
+               as the mean has coordinates
 
 All results equal those of the dense `TaskDynamics` up to rounding. They are computed in machine
 code, `kernels.task`, with one call for each method.
@@ -38,8 +38,9 @@ class Coordinates:
         h: Number of tool coordinates of a robot.
         plan: Index tables for compiled functions.
         slices: Slice of each subtask in a stacked vector.
-        own: Slice of each robot in a vector over the joints.
-        chosen: Indices of the chosen joints among N m own coordinates, in the subtasks' order.
+        own: Slice of each robot in a vector of all joints.
+        chosen: Indices of the chosen joints among the coordinates of all robots (m for each), in
+            the order of the subtasks.
     """
 
     h: int
@@ -50,7 +51,7 @@ class Coordinates:
 
 
 class RobotwiseDynamics(TaskDynamics):
-    """Task dynamics without matrices of the team, which are computed at the first access only.
+    """Task dynamics from terms of each robot; matrices of the team are computed if accessed.
 
     Args:
         coordinates: Coordinates of the subtasks.

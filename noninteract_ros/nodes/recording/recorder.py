@@ -30,11 +30,11 @@ DESCRIPTION = "/robot_description"
 POLL_PERIOD = 0.004  # [s]
 FLUSH_PERIOD = 0.5  # [s]
 STATUS_PERIOD = 1.0  # [s]
-SCAN_PERIOD = 0.2  # [s] of the search for topics while new ones appear ...
-IDLE_SCAN_PERIOD = 1.0  # [s] ... and after so many scans without a new one:
-IDLE_SCANS = 10
-QUIET_TIME = 0.05  # [s] without a message, after which the recording ends ...
-DRAIN_TIMEOUT = 1.0  # [s] ... or this time after the stop, whichever is first
+SCAN_PERIOD = 0.2  # [s] between searches for topics while new ones appear
+IDLE_SCANS = 10  # searches without a new topic, after which they become rarer
+IDLE_SCAN_PERIOD = 1.0  # [s] between searches then
+QUIET_TIME = 0.05  # [s] without a message after a stop, which ends the recording
+DRAIN_TIMEOUT = 1.0  # [s] after a stop, at which the recording ends at the latest
 
 PARAMETERS: dict[str, tuple[Any, str]] = {
     "output": ("", "MCAP file to write; empty: runs/<date and time>/run.mcap."),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Energy account of the team at its external port, as published by the controller."""
+"""Energy account of the team in a recording: series over time, metrics and checks."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,14 +16,15 @@ from noninteract_ros.reporting.metrics.intervals import laws
 from noninteract_ros.reporting.recording.recorded import INTERVENTIONS, Recorded, common_times
 
 TOPIC = "energy"
-LIMITS = ("limit", "too fast", "singularity", "no finite torque")  # in controller diagnostics
+# Words in the diagnostic message of the controller while limits change the torque.
+LIMITS = ("limit", "too fast", "singularity", "no finite torque")
 # Rounding error of the residual per tick, relative to the largest sum.
 ROUNDING = 64.0 * float(np.finfo(float).eps)
 
 
 @dataclass(frozen=True)
 class TeamAccount:
-    """Energy account over time, shape (n,) each.
+    """Published energy account over time, shape (m,) each.
 
     Attributes:
         t: Time of the run [s].
@@ -134,8 +135,8 @@ def _may_close(recorded: Recorded, found: TeamAccount) -> str:
         return f"law {scenario.general.law} has no gates"
     if not recorded.lockstep:
         return "wall time: torques act late, which costs energy"
-    if touched := [*scenario.surroundings, *scenario.pushes]:
-        return f"contact may close a gate: {', '.join(touched)}"
+    if contacts := [*scenario.surroundings, *scenario.pushes]:
+        return f"contact may close a gate: {', '.join(contacts)}"
     if any(recorded.has(f"{robot}/push") for robot in scenario.robots):
         return "external pushes may close a gate"
     if limits_acted(recorded, found):

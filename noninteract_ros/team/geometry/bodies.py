@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Collision bodies: links of robots, held objects, surroundings."""
+"""Collision bodies fixed to joints, and those of the links of a robot."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
