@@ -35,7 +35,7 @@ PAGES = {
 }
 SOURCES = {page: source for source, page in PAGES.items()}
 ALONE = ("index.md", "tutorial.md")  # pages without others beside them
-INTERNAL = ("control.fast", "control.telemetry")  # rooms without a public interface
+INTERNAL = ("control.fast", "control.telemetry")  # folders without a public interface
 
 
 def on_files(files: Any, config: Any) -> Any:
@@ -120,9 +120,9 @@ def examples(folder: str) -> str:
     return "\n\n".join(parts)
 
 
-def modules(room: str) -> str:
-    """Return the API reference of all modules of a room, those of its folders included."""
-    folder = ROOT / PACKAGE / room
+def modules(package: str) -> str:
+    """Return the API reference of all modules of a folder, those of its subfolders included."""
+    folder = ROOT / PACKAGE / package
     parts = []
     for file in sorted(folder.rglob("*.py")):
         name = ".".join(file.relative_to(ROOT / PACKAGE).with_suffix("").parts)

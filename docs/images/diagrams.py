@@ -110,10 +110,10 @@ STEPS = (
     ("Message", "JointState of the team"),
     ("Arrays", "q, v in the model's order"),
     ("Terms", "M, C, g of the team; x, J, S, M_i of the subtasks"),
-    ("References", "desired motion of each subtask"),
+    ("References", "desired motion and error of each subtask"),
     ("Account", "energy, tank and gates after the last tick"),
-    ("Law", "errors, impedance, decoupling: task acceleration"),
-    ("Torque", "joint torque within its limits"),
+    ("Law", "impedance, decoupling: task acceleration"),
+    ("Torque", "inverse dynamics, limits of joints"),
     ("Message", "JointState with efforts"),
 )
 
