@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drivers of robots under ros2_control, and a controller that a test steps."""
 
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -120,6 +121,7 @@ class SteppedController(Controller):
 
     def __init__(self, **kwargs: Any) -> None:
         self.published: dict[str, list[Any]] = {}
+        self._time_ns = 0
         super().__init__(**kwargs)
 
     def create_publisher(self, kind: Any, topic: str, *args: Any, **kwargs: Any) -> Any:
@@ -133,8 +135,18 @@ class SteppedController(Controller):
         service = next(item for item in self.services if item.srv_name.endswith(f"/{name}"))
         return service.callback(Trigger.Request(), Trigger.Response())
 
+    def now_ns(self) -> int:
+        """Return the newest stamp received, as the clock of the robots."""
+        return self._time_ns
+
     def receive(self, topic: str, message: Any) -> None:
         """Deliver a message to the subscriptions of a full topic."""
+        if isinstance(message, bytes):
+            seconds, nanoseconds = struct.unpack_from("<iI", message, 4)
+            self._time_ns = max(self._time_ns, seconds * 10**9 + nanoseconds)
+        if topic == "/team/joint_states" and self._interface.states is not None:
+            self._interface.receive(message)
+            return
         subscriptions = [item for item in self.subscriptions if item.topic_name == topic]
         assert subscriptions, topic
         for item in subscriptions:

@@ -61,6 +61,17 @@ class General:
     state_timeout: float = key(
         "Gap between states after which the controller resets [s]", 0.2, positive=True
     )
+    max_age: float = key(
+        "Age beyond which states, commands, pushes and wrenches are rejected, in wall time [s]",
+        0.1,
+        positive=True,
+    )
+    clock_tolerance: float = key(
+        "Lead of a stamp over the clock of the receiver that is accepted beyond one period, in"
+        " wall time [s]",
+        0.01,
+        minimum=0.0,
+    )
     max_state_skew: float = key(
         "Largest age difference of robot states on separate topics that is bridged by prediction;"
         " beyond it the team is held [s]",

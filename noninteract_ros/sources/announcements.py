@@ -9,7 +9,7 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, stamp, tick_stamp
 from noninteract_ros.subtasks.reference import Reference
 
-HORIZON = 3600.0
+HORIZON = 0.5
 """Time ahead [s] for which a source without further references releases the controller."""
 
 

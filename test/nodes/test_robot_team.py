@@ -166,7 +166,7 @@ def test_the_team_brakes_without_commands_in_wall_time(ros: Ros) -> None:
     np.testing.assert_allclose(effort[braking][1:], -20.0 * v[braking][:-1], rtol=1e-9)
     until(command_motion, "the team moves again")
     robot_team.publish(1, [3.0] * 4)
-    until(lambda: "goes back" in robot_team.monitor.value("robot_team", "last rejection"))
+    until(lambda: "s old" in robot_team.monitor.value("robot_team", "last rejection"))
 
 
 def test_descriptions_are_latched(ros: Ros) -> None:

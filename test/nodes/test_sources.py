@@ -94,8 +94,8 @@ def test_references_are_resent_with_their_state(ros: Ros) -> None:
     source.expect(reference(0), marker(9))
     source.state(0)
     source.expect(reference(0), marker(9))
-    source.state(5 * MS)
-    source.state(5 * MS)
+    source.state(MS)
+    source.state(MS)
     source.expect(marker(9))
 
 

@@ -19,6 +19,7 @@ from rclpy.task import Future
 
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.common.descriptions import RobotDescriptions
+from noninteract_ros.nodes.common.message_time import ROUNDING, ClockMonitor, StampChecker
 from noninteract_ros.nodes.common.program import until_shutdown
 from noninteract_ros.nodes.messages.messages import Level, to_diagnostics, to_status
 from noninteract_ros.scenario import Scenario
@@ -54,6 +55,7 @@ class ScenarioNode(Node):
         scenario: Checked scenario.
         lockstep: True where each tick waits for the command that answers its state.
         descriptions: Robot descriptions received on topics.
+        loop_inputs: Inputs that the loop polls itself.
         shutdown_requested: Return True after SIGINT or SIGTERM; for loops of nodes that handle
             their own shutdown.
     """
@@ -67,6 +69,7 @@ class ScenarioNode(Node):
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.descriptions = RobotDescriptions(self, nest(given), self.on_description_changed)
         self.shutdown_requested: Callable[[], bool] = lambda: False
+        self.loop_inputs: list[Any] = []
         self._rejected: Counter[str] = Counter()
         self._last_rejection = "none"
         # Nothing of a node can be built before its robots are known.
@@ -74,6 +77,7 @@ class ScenarioNode(Node):
         self.scenario = Scenario.from_dict(self.values)
         self._declare_parameters()
         self.lockstep = self.scenario.general.lockstep
+        self._clock_monitor = ClockMonitor(self.now_ns)
         self.create_wall_timer(DIAGNOSTICS_PERIOD, self.publish_diagnostics)
 
     def _declare_parameters(self) -> None:
@@ -93,13 +97,37 @@ class ScenarioNode(Node):
             typed = empty if value == () else _plain(value)
             self.declare_parameter(name, typed, descriptor, ignore_override=True)
 
+    def now_ns(self) -> int:
+        """Return the time of the clock of the node [ns]."""
+        now: int = self.get_clock().now().nanoseconds
+        return now
+
+    def stamp_checker(self, team_time: Callable[[], int | None]) -> StampChecker:
+        """Return a checker of stamps with the bounds of the scenario.
+
+        Args:
+            team_time: Return the stamp of the newest state [ns], or None before the first one; the
+                time of the robots in lockstep.
+        """
+        general = self.scenario.general
+        period = 1.0 / general.rate
+        if self.lockstep:
+            return StampChecker(team_time, period + ROUNDING)
+        return StampChecker(self.now_ns, period + general.clock_tolerance, general.max_age)
+
     def status(self) -> tuple[Level, str, dict[str, object]]:
         """Return level, message and values for `/diagnostics`."""
         raise NotImplementedError
 
     def publish_diagnostics(self) -> None:
         """Publish the status of the node."""
+        for item in self.loop_inputs:
+            item.refresh()
         level, text, values = self.status()
+        if not self.lockstep:
+            self._clock_monitor.update()
+            if jump := self._clock_monitor.problem():
+                level, text = max(level, Level.WARN), f"{text}; {jump}"
         if problem := self.descriptions.problem:
             level, text = Level.ERROR, text if problem in text else f"{problem}; {text}"
         self._publish_status(level, text, values)
@@ -164,6 +192,13 @@ class ScenarioNode(Node):
         self._last_rejection = f"{topic}: {reason}"
         text = f"rejected input on {topic}: {reason}"
         self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
+
+    def destroy_node(self) -> None:
+        """Destroy the node and its inputs."""
+        for item in self.loop_inputs:
+            item.destroy()
+        self.loop_inputs.clear()
+        super().destroy_node()
 
     @property
     def has_loop(self) -> bool:

@@ -16,7 +16,7 @@ from noninteract_ros.clock import seconds
 from noninteract_ros.control.controller import TeamController
 from noninteract_ros.control.references.inputs import HORIZON, SOURCES
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.common.lockstep import LockstepSources, StampChecker, max_stamp_lead
+from noninteract_ros.nodes.common.lockstep import LockstepSources
 from noninteract_ros.nodes.common.node import ScenarioNode, WallRate
 from noninteract_ros.nodes.common.program import run_program
 from noninteract_ros.nodes.common.team_status import TeamStatus
@@ -52,13 +52,13 @@ class Controller(ScenarioNode):
         self._queue: deque[Callable[[], None]] = deque()
         self._state: tuple[int, Array, Array, Array | None] | None = None
         self._state_received_at = self._waiting_since = -np.inf
-        self._stamps, self._max_lead = StampChecker(), max_stamp_lead(general.rate)
+        self._stamps = self.stamp_checker(self._team_time)
         self._missing: list[str] = []
         self._answered: int | None = None
         self._reset_stamp: int | None = None
         self._stop_requested = False
         self._now = 0.0
-        self._telemetry = Telemetry(self, team, stack)
+        self._telemetry = Telemetry(self, team, stack, self._team_time)
         self._controller_diagnostics = ControllerDiagnostics(self, self.core, self._telemetry)
         self._live = LiveParameters(
             self, self.core, self._post, self._controller_diagnostics.changed, self._configuration
@@ -104,6 +104,11 @@ class Controller(ScenarioNode):
         stamp, item = received
         inputs = self.core.inputs[subtask].sources[source]
         when = seconds(stamp)
+        try:
+            self._check_input_age(subtask, stamp)
+        except InputError as error:
+            self.reject_input(topic, str(error))
+            return
         if self._sources.starts_late(f"{subtask}/{source}", when, self._now):
             return
         if item is None:
@@ -115,13 +120,30 @@ class Controller(ScenarioNode):
         at_once = stamp == 0 or not self.lockstep
         try:
             if stamp:
-                self._stamps.check(topic, stamp, float("inf") if self.lockstep else HORIZON)
+                self._stamps.check(topic, stamp, max_lead=np.inf, max_age=np.inf)
             inputs.receive(self._now if at_once else when, item, self._now)
         except InputError as error:
             self.reject_input(topic, str(error))
             return
         if stamp:
             self._stamps.record(topic, stamp)
+
+    def _check_input_age(self, subtask: str, stamp: int) -> None:
+        """Check the time of an input of a source, or of its marker.
+
+        Inputs without a stamp take effect immediately, those older than their timeout never.
+        """
+        if not stamp:
+            return
+        if self.lockstep:
+            self._stamps.check_age(stamp, max_lead=HORIZON)
+        else:
+            timeout = self.scenario.subtasks[subtask].input.timeout
+            self._stamps.check_age(stamp, max_age=timeout)
+
+    def _team_time(self) -> int | None:
+        """Return the stamp of the newest state [ns], or None before the first one."""
+        return None if self._state is None else self._state[0]
 
     def _has_fresh_state(self) -> bool:
         age = time.monotonic() - self._state_received_at
@@ -131,8 +153,10 @@ class Controller(ScenarioNode):
     def _on_state(self, stamp: int, positions: Array, v: Array) -> None:
         """Receive joint positions and velocities (n,) of the team at a stamp [ns]."""
         q = self.core.team.configuration_from_joints(positions)
-        if self._stamps.accept("joint_states", stamp, self._max_lead):
+        if self._stamps.accept_state("joint_states", stamp):
             self._restart(stamp)
+        if self._state is None:
+            self._telemetry.discard_ahead(stamp)
         self._state_received_at = time.monotonic()
         if stamp == self._answered:
             if self.lockstep:  # The team has not received the answer.
@@ -178,17 +202,33 @@ class Controller(ScenarioNode):
             self._reset_stamp = None
             self.core.put_back()
         tick = self.core.step(seconds(stamp), q, v, applied, self._telemetry.wrenches)
-        self._interface.answer(stamp, tick)
         self._answered = stamp
+        if not self._is_expired(stamp):
+            self._interface.answer(stamp, tick)
         self._telemetry.publish(stamp, self.core, tick)
         self._controller_diagnostics.update(seconds(stamp), tick)
         self._controller_diagnostics.cycle_times.append(time.perf_counter() - began)
 
+    def _is_expired(self, stamp: int) -> bool:
+        """Return True for a state too old to be answered, as after a pause of this program."""
+        if self.lockstep:
+            return False
+        try:
+            self._stamps.check_age(stamp)
+        except InputError as error:
+            self.reject_input("joint_states", f"unanswered: {error}")
+            return True
+        return False
+
     def loop(self) -> None:
-        """Wall time: answer the newest state once per period."""
+        """Wall time: answer the newest state, once it is received or once per period."""
         rate = WallRate(self.scenario.general.rate)
+        states = self._interface.states
         while self.context.ok() and not self.shutdown_requested():
-            rate.sleep()
+            if states is not None:
+                states.wait(1.0 / self.scenario.general.rate)
+            else:
+                rate.sleep()
             self.run_once()
         if self.context.ok() and self._interface.efforts:
             self._shut_down(rate)
@@ -217,7 +257,11 @@ class Controller(ScenarioNode):
         if state is not None:
             self._now = seconds(state[0])
         self._run_queue()
-        if state is not None and self._answered != state[0]:
+        if state is None or self._answered == state[0]:
+            return
+        if self._is_expired(state[0]):
+            self._answered = state[0]
+        else:
             self._answer(*state)
 
     def on_description_changed(self) -> None:

@@ -12,7 +12,6 @@ from sensor_msgs.msg import JointState
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.common.lockstep import StampChecker, max_stamp_lead
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.nodes.messages.cdr import (
     QUANTITIES,
@@ -126,7 +125,7 @@ class RobotStates:
             team.joint_names, general.state_prediction, general.max_state_skew
         )
         self._lock = threading.Lock()
-        self._stamps, self._max_lead = StampChecker(), max_stamp_lead(general.rate)
+        self._stamps = node.stamp_checker(lambda: None)
         self._codec = JointStateCodec(team.joint_names)
         self._publisher = node.create_publisher(JointState, "joint_states", LOOP_QOS)
         self.commanded = np.zeros(team.n)
@@ -148,8 +147,8 @@ class RobotStates:
         with self._lock:
             if not self._node.lockstep:
                 # Unstamped messages use the current time.
-                stamp = stamp or self._node.get_clock().now().nanoseconds
-                if self._stamps.accept(f"{topic} {joints[0]}", stamp, self._max_lead):
+                stamp = stamp or self._node.now_ns()
+                if self._stamps.accept(f"{topic} {joints[0]}", stamp):
                     self._assembler.reset(joints)
             self._assembler.update(joints, stamp, position, velocity, effort)
             if not (self._node.lockstep and self._assembler.simultaneous):

@@ -6,6 +6,7 @@ from sensor_msgs.msg import JointState
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.common.efforts import EffortPublishers
+from noninteract_ros.nodes.common.loop_input import LoopInput
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.nodes.controller.robot_states import RobotStates, StateCallback
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
@@ -27,6 +28,7 @@ class TeamInterface:
     Attributes:
         efforts: Publishers to the effort controllers of the robots.
         applied: Efforts of the newest state, shape (n,) [N or N m], or None.
+        states: Wall time: states of the whole team, or None.
     """
 
     def __init__(self, node: ScenarioNode, team: Team, on_state: StateCallback) -> None:
@@ -37,12 +39,16 @@ class TeamInterface:
         self.efforts = EffortPublishers(node, team)
         self._last = b""
         self._robots: RobotStates | None = None
+        self.states: LoopInput | None = None
         if node.scenario.has_robot_state_topics:
             self._robots = RobotStates(node, team, on_state)
+        elif node.lockstep:
+            node.subscribe(JointState, "joint_states", self.receive, raw=True)
         else:
-            node.subscribe(JointState, "joint_states", self._on_state, raw=True)
+            self.states = LoopInput(node, JointState, "joint_states")
 
-    def _on_state(self, data: bytes) -> None:
+    def receive(self, data: bytes) -> None:
+        """Receive a serialized state of the team."""
         stamp, position, velocity, self.applied = self._codec.decode(data)
         assert position is not None  # The codec requires both.
         assert velocity is not None
@@ -65,11 +71,15 @@ class TeamInterface:
         """Wall time: process received states; without states, fade the torques to gravity."""
         if self._robots is not None:
             self._robots.poll()
+        elif self.states is not None:
+            self.states.poll(self.receive)
         self.efforts.fade_to_gravity()
 
     def problem(self) -> str:
         """Return the reason why the team must be held, or ""."""
-        return self._robots.problem() if self._robots else ""
+        if self._robots is not None:
+            return self._robots.problem()
+        return self.states.problem() if self.states else ""
 
     def waiting_for(self) -> list[str]:
         """Return the robots without a state, if each robot publishes its own."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Topics published by the controller: subtask states, feedback, energies."""
 
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
@@ -15,7 +16,6 @@ from noninteract_ros.control.energy.account import QUANTITIES, EnergyAccount, qu
 from noninteract_ros.control.telemetry.limit_activity import LimitActivity
 from noninteract_ros.control.telemetry.subtask_energies import LABELS, rows
 from noninteract_ros.control.tick import Tick
-from noninteract_ros.nodes.common.lockstep import StampChecker, max_stamp_lead
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.nodes.messages.messages import EnergyCodec, SubtaskCodec, external_wrench
 from noninteract_ros.subtasks.stack import SubtaskStack
@@ -35,13 +35,20 @@ class Telemetry:
         node: Controller node.
         team: Robot team.
         stack: Subtasks of the team.
+        team_time: Return the stamp of the newest state [ns], or None while it is unknown.
 
     Attributes:
         safety: Activity of singularities and joint limits.
         wrenches: Newest wrenches on the tools, shape (N, 6) [N, N m]; zero without a sensor.
     """
 
-    def __init__(self, node: ScenarioNode, team: Team, stack: SubtaskStack) -> None:
+    def __init__(
+        self,
+        node: ScenarioNode,
+        team: Team,
+        stack: SubtaskStack,
+        team_time: Callable[[], int | None],
+    ) -> None:
         general = node.scenario.general
         self._team, self._stack = team, stack
         self._rate = general.rate
@@ -51,7 +58,7 @@ class Telemetry:
         self._tick: Tick | None = None
         self.safety = LimitActivity(team.joint_names)
         self.wrenches = np.zeros((len(team.names), 6))
-        self._stamps, self._max_lead = StampChecker(), max_stamp_lead(general.rate)
+        self._stamps = node.stamp_checker(team_time)
         self._wrench_stamps = dict.fromkeys(general.force_sensors, -1)
         for name in general.force_sensors:
             callback = partial(self._on_wrench, name)
@@ -79,7 +86,7 @@ class Telemetry:
 
     def _on_wrench(self, robot: str, message: WrenchStamped) -> None:
         stamp, wrench = external_wrench(message)
-        self._stamps.accept(robot, stamp, self._max_lead)
+        self._stamps.accept(robot, stamp)
         self.wrenches[self._team.index(robot)] = wrench
         self._wrench_stamps[robot] = stamp
 
@@ -89,6 +96,14 @@ class Telemetry:
         self.safety.reset()
         self._team_energy.reset()
         self._wrench_stamps = dict.fromkeys(self._wrench_stamps, -1)
+
+    def discard_ahead(self, stamp: int) -> None:
+        """Discard wrenches received before the first state that are ahead of its stamp [ns]."""
+        for robot, newest in self._wrench_stamps.items():
+            if newest > stamp + 1e9 / self._rate:
+                self.wrenches[self._team.index(robot)] = 0.0
+                self._wrench_stamps[robot] = -1
+                self._stamps.discard(robot)
 
     def missing(self, stamp: int) -> list[str]:
         """Return the wrench topics still awaited by the tick with this stamp [ns]."""

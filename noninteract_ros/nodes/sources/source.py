@@ -10,8 +10,6 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
-from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.common.lockstep import StampChecker, max_stamp_lead
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, WallRate
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import Level, SubtaskCodec
@@ -50,7 +48,7 @@ class SourceNode(ScenarioNode):
         self._joints = JointStateCodec(team.joint_names)
         self._rate, self._update_rate = self.scenario.general.rate, update_rate
         self._announcer = Announcer(sampler, self._rate)
-        self._stamps, self._max_lead = StampChecker(), max_stamp_lead(self._rate)
+        self._stamps = self.stamp_checker(self._team_time)
         self._started_at: int | None = None
         self._stamp = -1
         self._state_received_at = -np.inf
@@ -65,7 +63,7 @@ class SourceNode(ScenarioNode):
 
     def _on_state(self, data: bytes) -> None:
         stamp = self._joints.decode(data).stamp_ns
-        if self._stamps.accept("joint_states", stamp, self._max_lead):
+        if self._stamps.accept_state("joint_states", stamp):
             self._restart(stamp)
         self._state_received_at = time.monotonic()
         if stamp == self._stamp and self._started_at is not None:
@@ -81,6 +79,10 @@ class SourceNode(ScenarioNode):
         if self.lockstep and not self._uses_feedback:
             self._publish_tick(stamp)
 
+    def _team_time(self) -> int | None:
+        """Return the stamp of the newest state [ns], or None before the first one."""
+        return None if self._started_at is None else self._stamp
+
     def _restart(self, stamp: int) -> None:
         """Discard feedback and references of before the restart of the team."""
         self._stamps.reset()
@@ -91,9 +93,9 @@ class SourceNode(ScenarioNode):
 
     def _on_feedback(self, message: WrenchStamped) -> None:
         stamp, force = self._codec.force(message)
-        if self.lockstep and stamp > self._stamp + 2e9 / self._rate:
-            raise InputError(f"stamp {seconds(stamp):.6f} s answers no state of the team")
-        self._stamps.accept("feedback", stamp, self._max_lead)
+        # In lockstep the feedback may arrive before the state that it belongs to.
+        lead = 2.0 / self._rate if self.lockstep else None
+        self._stamps.accept("feedback", stamp, max_lead=lead)
         self._feedback = force
         if self.lockstep and self._started_at is not None:
             self._publish_tick(stamp)

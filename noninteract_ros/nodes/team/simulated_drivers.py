@@ -18,6 +18,7 @@ from std_msgs.msg import Float64MultiArray
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.common.efforts import EffortCodec
+from noninteract_ros.nodes.common.loop_input import LoopInput
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import WORLD, to_stamp
@@ -84,6 +85,7 @@ class SimulatedDrivers:
         self._torque = np.zeros(team.n)
         self._inputs: list[_CommandInput] = []
         self._outputs: list[_StateOutput] = []
+        self._commands: LoopInput | None = None
         if not node.scenario.has_robot_state_topics:
             publisher = node.create_publisher(JointState, "joint_states", LOOP_QOS)
             codec = JointStateCodec(team.joint_names)
@@ -103,8 +105,20 @@ class SimulatedDrivers:
         if shared.names:
             self._inputs.append(shared)
             codec = JointStateCodec(team.joint_names, required=("effort",))
-            callback = partial(self._on_commands, shared, codec)
-            node.subscribe(JointState, "joint_commands", callback, raw=True)
+            self._receive_commands = partial(self._on_commands, shared, codec)
+            if node.lockstep:
+                node.subscribe(JointState, "joint_commands", self._receive_commands, raw=True)
+            else:
+                self._commands = LoopInput(node, JointState, "joint_commands")
+
+    def poll(self) -> None:
+        """Wall time: process received torques of the whole team."""
+        if self._commands is not None:
+            self._commands.poll(self._receive_commands)
+
+    def problem(self) -> str:
+        """Return the reason why no torques of the whole team are applied, or ""."""
+        return self._commands.problem() if self._commands else ""
 
     def _add_output(self, index: int) -> None:
         general, robot = self._node.scenario.general, self._team.robots[index]
