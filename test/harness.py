@@ -186,12 +186,13 @@ class Ros:
         self._monitors: list[TeamMonitor] = []
         self._failures: list[Exception] = []
         self._threads: list[threading.Thread] = []
+        self._loops: dict[Node, threading.Thread] = {}
         self.probe = self.add_node(
             rclpy.create_node("probe", namespace="team", context=self.context)
         )
         self._thread(spin, self._executor, self.context)
 
-    def _thread(self, target: Callable[..., None], *arguments: Any) -> None:
+    def _thread(self, target: Callable[..., None], *arguments: Any) -> threading.Thread:
         def run() -> None:
             try:
                 target(*arguments)
@@ -200,13 +201,14 @@ class Ros:
 
         self._threads.append(threading.Thread(target=run, daemon=True))
         self._threads[-1].start()
+        return self._threads[-1]
 
     def add_node(self, node: Any) -> Any:
         """Add a node to the executor, and run its loop in a thread."""
         self._executor.add_node(node)
         self._nodes.append(node)
         if isinstance(node, ScenarioNode) and node.has_loop:
-            self._thread(self._loop, node)
+            self._loops[node] = self._thread(self._loop, node)
         return node
 
     def _loop(self, node: ScenarioNode) -> None:
@@ -222,6 +224,10 @@ class Ros:
         """Destroy a node."""
         self._executor.remove_node(node)
         self._nodes.remove(node)
+        thread = self._loops.pop(node, None)
+        if thread is not None:
+            node._destroyed = True
+            thread.join(DEADLINE)
         node.destroy_node()
 
     def stack(self, values: Mapping[str, Any]) -> "Stack":

@@ -290,3 +290,14 @@ def test_diagnostics_carry_level_and_values():
     assert (found.level, found.name, found.message) == (b"\x01", "controller", "late")
     assert [(v.key, v.value) for v in found.values] == [("period", "0.00123457"), ("n", "3")]
     assert max(Level.OK, Level.ERROR) is Level.ERROR
+
+
+@pytest.mark.parametrize("size", [120, 176, 300])
+def test_references_that_are_cut_off_or_too_long_are_rejected(size: int) -> None:
+    """Bytes of the wrong length are no reference, not even one without velocity."""
+    codec = SubtaskCodec("cooperative", ["cooperative"], ["x", "y"])
+    data = codec.encode(10**9, np.ones(2), np.ones(2), np.ones(2))
+    assert size < len(data) - 8 or size > len(data) + 8
+    with pytest.raises(InputError, match="bytes"):
+        codec.decode(data[:size].ljust(size, b"\0"))
+    assert codec.decode(data + bytes(4)) is not None

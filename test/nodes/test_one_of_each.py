@@ -8,6 +8,7 @@ import rclpy
 from harness import Ros, TeamMonitor, paper
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
+from std_srvs.srv import Trigger
 from waiting import until
 
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
@@ -128,3 +129,49 @@ def test_a_restarted_controller_takes_over_by_itself(ros: Ros) -> None:
         ),
         "commands of the controller in force",
     )
+
+
+def test_a_stopped_team_applies_nothing_until_it_is_resumed(ros: Ros) -> None:
+    """It brakes by itself, even if the controller has gone and another one commands."""
+    values = paper(**ALONE)
+    monitor = ros.monitor(values)
+    ros.make("robot_team", values)
+    controller = ros.make("controller", values)
+    until(lambda: monitor.has_status("robot_team", "running")() and monitor.commands)
+    assert ros.call(Trigger, "controller/stop").success
+    monitor.wait_for_status("robot_team", "stopped until resume")
+    before = monitor.newest().position
+    ros.remove(controller)
+    stranger = Stranger(ros, monitor, "joint_commands")
+    for _ in range(20):
+        stranger.command(50.0)
+        ros.drain()
+    assert np.abs(monitor.newest().position - before).max() < 1e-3
+    ros.make("controller", values)
+    until(monitor.has_new_status("robot_team"))
+    assert monitor.has_status("robot_team", "stopped until resume")()
+    assert ros.call(Trigger, "controller/resume").success
+    until(lambda: "stopped" not in text(monitor, "robot_team"), "the end of the stop")
+
+
+def test_the_team_can_be_stopped_without_a_controller(ros: Ros) -> None:
+    """`~/stop` of the team acts at once, and `~/resume` ends it."""
+    values = paper(**ALONE)
+    monitor = ros.monitor(values)
+    ros.make("robot_team", values)
+    commander = Stranger(ros, monitor, "joint_commands")
+    until(lambda: monitor.states)
+
+    def moves() -> bool:
+        commander.command(3.0)
+        return bool(np.abs(monitor.newest().effort).max() == 3.0)
+
+    until(moves, "the torque of the command")
+    assert ros.call(Trigger, "robot_team/stop").success
+    monitor.wait_for_status("robot_team", "stopped until resume")
+    for _ in range(10):
+        commander.command(3.0)
+        ros.drain()
+    assert np.abs(monitor.newest().effort).max() != 3.0
+    assert ros.call(Trigger, "robot_team/resume").success
+    until(moves, "the torque of the command again")

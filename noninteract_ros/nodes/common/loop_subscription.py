@@ -6,6 +6,7 @@ so messages are taken with the C function that `rclpy` calls too.
 """
 
 import ctypes
+import threading
 from dataclasses import dataclass
 from typing import Any
 
@@ -87,7 +88,7 @@ class LoopSubscription:
     """
 
     def __init__(self, node: Node, message_type: type, topic: str) -> None:
-        self._context = node.context
+        self._lock, self._destroyed = threading.Lock(), False
         self.topic = node.resolve_topic_name(topic)
         with node.handle:
             # An executor never learns of this subscription.
@@ -100,31 +101,42 @@ class LoopSubscription:
 
     def wait(self, timeout: float) -> None:
         """Wait for a message, at most `timeout` [s]."""
-        with self._handle, self._wait_set:
-            self._wait_set.clear_entities()
-            self._wait_set.add_subscription(self._handle)
-            self._wait_set.wait(max(0, round(1e9 * timeout)))
+        with self._lock:
+            if self._destroyed:
+                return
+            with self._handle, self._wait_set:
+                self._wait_set.clear_entities()
+                self._wait_set.add_subscription(self._handle)
+                self._wait_set.wait(max(0, round(1e9 * timeout)))
 
     def take(self) -> list[Received]:
         """Return all received messages, at most `MAX_BATCH`, in the order of reception."""
         found: list[Received] = []
-        with self._handle:
-            pointer = self._handle.pointer
-            while len(found) < MAX_BATCH:
-                if _take(pointer, self._buffer, self._info, None) != TAKEN:
-                    break
-                data = ctypes.string_at(self._buffer.data, self._buffer.length)
-                found.append(Received(data=data, gid=bytes(self._info.gid)))
+        with self._lock:
+            if self._destroyed:
+                return found
+            with self._handle:
+                pointer = self._handle.pointer
+                while len(found) < MAX_BATCH:
+                    if _take(pointer, self._buffer, self._info, None) != TAKEN:
+                        break
+                    data = ctypes.string_at(self._buffer.data, self._buffer.length)
+                    found.append(Received(data=data, gid=bytes(self._info.gid)))
         return found
 
     def publishers(self) -> int:
         """Return the number of matched publishers."""
-        with self._handle:
-            count: int = self._handle.get_publisher_count()
+        with self._lock:
+            if self._destroyed:
+                return 0
+            with self._handle:
+                count: int = self._handle.get_publisher_count()
         return count
 
     def destroy(self) -> None:
         """Destroy the subscription; the node must still exist."""
-        self._wait_set.destroy_when_not_in_use()
-        self._handle.destroy_when_not_in_use()
-        _rcutils.rcutils_uint8_array_fini(self._buffer)
+        with self._lock:
+            self._destroyed = True
+            self._wait_set.destroy_when_not_in_use()
+            self._handle.destroy_when_not_in_use()
+            _rcutils.rcutils_uint8_array_fini(self._buffer)

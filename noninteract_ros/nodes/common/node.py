@@ -70,6 +70,7 @@ class ScenarioNode(Node):
         self.descriptions = RobotDescriptions(self, nest(given), self.on_description_changed)
         self.shutdown_requested: Callable[[], bool] = lambda: False
         self.loop_inputs: list[Any] = []
+        self._destroyed = False
         self._rejected: Counter[str] = Counter()
         self._last_rejection = "none"
         # Nothing of a node can be built before its robots are known.
@@ -194,11 +195,17 @@ class ScenarioNode(Node):
         self.get_logger().warning(text, throttle_duration_sec=LOG_PERIOD)
 
     def destroy_node(self) -> None:
-        """Destroy the node and its inputs."""
+        """Destroy the node and its inputs, and end its loop."""
+        self._destroyed = True
         for item in self.loop_inputs:
             item.destroy()
         self.loop_inputs.clear()
         super().destroy_node()
+
+    @property
+    def running(self) -> bool:
+        """True until the context is shut down or the node is destroyed."""
+        return self.context.ok() and not self._destroyed
 
     @property
     def has_loop(self) -> bool:

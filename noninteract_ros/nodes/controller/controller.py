@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from std_msgs.msg import Header
+from std_msgs.msg import Bool, Header
 from std_srvs.srv import Trigger
 
 from noninteract_ros.arrays import Array
@@ -16,6 +16,7 @@ from noninteract_ros.clock import seconds
 from noninteract_ros.control.controller import TeamController
 from noninteract_ros.control.references.inputs import HORIZON, SOURCES
 from noninteract_ros.errors import InputError
+from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
 from noninteract_ros.nodes.common.lockstep import LockstepSources
 from noninteract_ros.nodes.common.node import ScenarioNode, WallRate
 from noninteract_ros.nodes.common.program import run_program
@@ -76,6 +77,9 @@ class Controller(ScenarioNode):
             codec = SubtaskCodec(subtask.name, subtask.elements, subtask.axes, subtask.rotates)
             for source in SOURCES:
                 subscribe_to_source(self, codec, source, self._on_input)
+        # Latched, so that a team that is restarted stays stopped. Nothing is published before the
+        # first stop, so that a restarted controller does not resume the team.
+        self._stopped_publisher = self.create_publisher(Bool, "stopped", LATCHED_QOS)
         self.create_service(Trigger, "~/stop", self._on_stop)
         self.create_service(Trigger, "~/resume", self._on_resume)
         self.create_service(Trigger, "~/refill", self._on_refill)
@@ -224,7 +228,7 @@ class Controller(ScenarioNode):
         """Wall time: answer the newest state, once it is received or once per period."""
         rate = WallRate(self.scenario.general.rate)
         states = self._interface.states
-        while self.context.ok() and not self.shutdown_requested():
+        while self.running and not self.shutdown_requested():
             if states is not None:
                 states.wait(1.0 / self.scenario.general.rate)
             else:
@@ -285,6 +289,7 @@ class Controller(ScenarioNode):
 
     def _on_stop(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._stop_requested = True
+        self._stopped_publisher.publish(Bool(data=True))
         self._post(self.core.stop)
         return self._succeed(response, "stopped")
 
@@ -294,6 +299,7 @@ class Controller(ScenarioNode):
 
     def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._stop_requested = False
+        self._stopped_publisher.publish(Bool(data=False))
         if problem := self._controller_diagnostics.problem:
             response.success, response.message = False, f"holding the team: {problem}"
             return response

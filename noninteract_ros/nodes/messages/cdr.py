@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
 from noninteract_ros.arrays import Array
@@ -22,6 +22,7 @@ Message = TypeVar("Message")
 SECOND = 10**9
 MAX_MAGNITUDE = 1e9  # in any unit
 QUANTITIES = ("position", "velocity", "effort")
+PADDING = 8  # bytes that middleware may append or omit at the end
 ENCAPSULATION = b"\x00\x01\x00\x00"  # plain CDR, little-endian, no options
 STAMP = struct.Struct("<iI")
 FORMATS = {"int32": "<i", "uint32": "<I", "double": "<d"}
@@ -48,6 +49,11 @@ def deserialize(data: bytes, message_type: type[Message]) -> Message:
         message: Message = deserialize_message(bytes(data), message_type)
     except RuntimeError as error:
         raise InputError(f"the bytes are not a {message_type.__name__}") from error
+    # Sequences that were cut off are read as empty ones.
+    size = len(serialize_message(message))
+    if abs(len(data) - size) > PADDING:
+        text = f"{len(data)} bytes for a {message_type.__name__} of {size} bytes"
+        raise InputError(text)
     return message
 
 
@@ -150,7 +156,7 @@ class CdrTemplate:
         Raises:
             InputError: The stamp is not a time.
         """
-        if len(data) < self._end or data[:2] != ENCAPSULATION[:2]:
+        if not self._end <= len(data) <= self._end + PADDING or data[:2] != ENCAPSULATION[:2]:
             return None
         words = np.frombuffer(data[4 : 4 + self._room].ljust(self._room, b"\0"), "<u8")
         if (words & self._mask).tobytes() != self._expected:

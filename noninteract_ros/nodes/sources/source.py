@@ -134,7 +134,7 @@ class SourceNode(ScenarioNode):
         """Wall time: publish one reference per update period while states are received."""
         rate = WallRate(self._update_rate)
         timeout = self.scenario.general.state_timeout
-        while self.context.ok():
+        while self.running:
             rate.sleep()
             started_at = self._started_at
             if started_at is None or time.monotonic() - self._state_received_at > timeout:

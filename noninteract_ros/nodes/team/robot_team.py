@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import WrenchStamped
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Header, String
+from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from noninteract_ros.clock import seconds, tick_stamp
@@ -23,6 +23,7 @@ from noninteract_ros.nodes.messages import messages
 from noninteract_ros.nodes.messages.messages import Level
 from noninteract_ros.nodes.team.simulated_drivers import BodyPosePublisher, SimulatedDrivers
 
+STOP_DURATION = 10.0  # in units of 1 / stop_rate, within which a controller brings it to rest
 RESEND_PERIOD = 0.2  # [s] wall time after which an unanswered state is published again
 
 
@@ -48,6 +49,7 @@ class RobotTeam(ScenarioNode):
         self._stamp = self._previous_stamp = 0
         self._stamps = self.stamp_checker(lambda: self._stamp)
         self._problem = ""
+        self._stopped_at: float | None = None  # Monotonic time from which a stop is held.
         self._sent_at = 0.0
         self._command: tuple[int, np.ndarray] | None = None
         self._command_received_at = -np.inf
@@ -69,6 +71,10 @@ class RobotTeam(ScenarioNode):
             self.subscribe(
                 WrenchStamped, f"{robot.name}/push", partial(self._on_push, robot.name, tool)
             )
+        if not self.lockstep:
+            self.subscribe(Bool, "stopped", self._on_stopped, qos=LATCHED_QOS)
+        self.create_service(Trigger, "~/stop", self._locked(self._stop))
+        self.create_service(Trigger, "~/resume", self._locked(self._resume))
         self.create_service(SetBool, "~/pause", self._on_pause)
         self.create_service(Trigger, "~/step", self._locked(self._step_once))
         self.create_service(Trigger, "~/reset", self._locked(self._reset))
@@ -120,11 +126,32 @@ class RobotTeam(ScenarioNode):
         else:
             self._advance(torque)
 
+    def _on_stopped(self, message: Bool) -> None:
+        """Receive a stop of the controller, which brings the team to rest smoothly, or its end."""
+        duration = STOP_DURATION / self.scenario.general.stop_rate
+        with self._lock:
+            self._stopped_at = time.monotonic() + duration if message.data else None
+
+    def _stop(self) -> tuple[bool, str]:
+        self._stopped_at = -np.inf
+        return True, "stopped: no torques are applied until resume"
+
+    def _resume(self) -> tuple[bool, str]:
+        self._stopped_at = None
+        return True, "running"
+
+    @property
+    def _stop_held(self) -> bool:
+        """True while the team brakes by itself and applies no torques."""
+        return self._stopped_at is not None and time.monotonic() >= self._stopped_at
+
     def _advance(self, torque: np.ndarray | None) -> None:
         """Simulate one tick and publish the next state."""
         if self._finished():
             return
         simulation = self._simulation
+        if self._stop_held:
+            torque = None
         if torque is not None:
             torque = self._drivers.applied(torque, simulation.q, simulation.v)
         simulation.step(torque)
@@ -179,7 +206,7 @@ class RobotTeam(ScenarioNode):
             self._loop_paced(rate)
             return
         timeout = self.scenario.general.command_timeout
-        while self.context.ok():
+        while self.running:
             rate.sleep()
             self._drivers.poll()
             problem = self._drivers.problem()
@@ -193,7 +220,7 @@ class RobotTeam(ScenarioNode):
 
     def _loop_paced(self, rate: WallRate) -> None:
         """Step once the command is received and the period has begun."""
-        while self.context.ok():
+        while self.running:
             rate.sleep()
             self._step_allowed.wait(RESEND_PERIOD)
             with self._lock:
@@ -252,6 +279,10 @@ class RobotTeam(ScenarioNode):
             return Level.OK, FINISHED, values
         if self._paused:
             return Level.OK, PAUSED, values
+        if self._stop_held:
+            text = f"; {self._problem}" if self._problem else ""
+            level = Level.ERROR if self._problem else Level.WARN
+            return level, f"stopped until resume{text}", values
         if self._command_received_at == -np.inf:
             return Level.WARN, "waiting for the first command", values
         if self.lockstep and age > 2 * RESEND_PERIOD:
