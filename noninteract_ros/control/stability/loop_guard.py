@@ -44,6 +44,14 @@ class LoopGuard:
             return ""
         return f"law {wanted[0]}, {worst.name}: {worst.divergence()}"
 
+    def divergence(self, q: Array, law: str, impedance: Impedance) -> str:
+        """Return why the loop diverges with a law and its gains at q, shape (nq,), or ""."""
+        try:
+            worst = max(self._loops(q, law, impedance), key=_growth)
+        except np.linalg.LinAlgError:  # At a singularity the law is faded out.
+            return ""
+        return "" if worst.stable else f"law {law}, {worst.name}: {worst.divergence()}"
+
     def _loops(self, q: Array, law: str, impedance: Impedance) -> list[Loop]:
         state = self._team.state(q, np.zeros(self._team.n))
         task = self._stack.evaluate(state)

@@ -19,6 +19,7 @@ from rclpy.task import Future
 
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.common.descriptions import RobotDescriptions
+from noninteract_ros.nodes.common.loop_timing import LoopTiming
 from noninteract_ros.nodes.common.message_time import ROUNDING, ClockMonitor, StampChecker
 from noninteract_ros.nodes.common.program import until_shutdown
 from noninteract_ros.nodes.messages.messages import Level, to_diagnostics, to_status
@@ -56,6 +57,7 @@ class ScenarioNode(Node):
         lockstep: True where each tick waits for the command that answers its state.
         descriptions: Robot descriptions received on topics.
         loop_inputs: Inputs that the loop polls itself.
+        timing: Wall time: answers to states, recorded by controller and team.
         shutdown_requested: Return True after SIGINT or SIGTERM; for loops of nodes that handle
             their own shutdown.
     """
@@ -79,6 +81,8 @@ class ScenarioNode(Node):
         self._declare_parameters()
         self.lockstep = self.scenario.general.lockstep
         self._clock_monitor = ClockMonitor(self.now_ns)
+        general = self.scenario.general
+        self.timing = LoopTiming(general.rate, general.state_timeout)
         self.create_wall_timer(DIAGNOSTICS_PERIOD, self.publish_diagnostics)
 
     def _declare_parameters(self) -> None:
@@ -127,6 +131,10 @@ class ScenarioNode(Node):
         level, text, values = self.status()
         if not self.lockstep:
             self._clock_monitor.update()
+            values |= self.timing.values()
+            late_level, late = self.timing.problem()
+            if late:
+                level, text = max(level, late_level), f"{text}; {late}"
             if jump := self._clock_monitor.problem():
                 level, text = max(level, Level.WARN), f"{text}; {jump}"
         if problem := self.descriptions.problem:

@@ -24,6 +24,7 @@ from noninteract_ros.nodes.common.team_status import TeamStatus
 from noninteract_ros.nodes.controller.diagnostics import ControllerDiagnostics
 from noninteract_ros.nodes.controller.parameters import AuthorityTopics, LiveParameters
 from noninteract_ros.nodes.controller.source_subscriptions import Input, subscribe_to_source
+from noninteract_ros.nodes.controller.supervision import LoopSupervision
 from noninteract_ros.nodes.controller.team_interface import TeamInterface
 from noninteract_ros.nodes.controller.telemetry import Telemetry
 from noninteract_ros.nodes.messages.messages import Level, SubtaskCodec, stamp_ns
@@ -71,6 +72,7 @@ class Controller(ScenarioNode):
             self.core.inputs,
             general.lockstep_timeout,
         )
+        self._supervision = LoopSupervision(self.scenario, self.core, self.timing)
         self._interface = TeamInterface(self, team, self._on_state)
         self.subscribe(Header, "put_back", self._on_team_reset)
         for subtask in stack.subtasks:
@@ -187,6 +189,7 @@ class Controller(ScenarioNode):
         self._stamps.reset()
         self._stamps.record("joint_states", stamp)
         self._telemetry.reset()
+        self._supervision.reset()
         self._post(self.core.reset)
 
     def _answer_if_complete(self) -> None:
@@ -204,14 +207,28 @@ class Controller(ScenarioNode):
         began = time.perf_counter()
         if self._reset_stamp is not None and stamp >= self._reset_stamp:
             self._reset_stamp = None
+            self._supervision.reset()
             self.core.put_back()
         tick = self.core.step(seconds(stamp), q, v, applied, self._telemetry.wrenches)
         self._answered = stamp
         if not self._is_expired(stamp):
             self._interface.answer(stamp, tick)
+            self.timing.record(stamp, seconds(self.now_ns() - stamp))
+        if not self.lockstep:
+            self._stop_if_implausible(stamp, q, tick.restarted)
         self._telemetry.publish(stamp, self.core, tick)
         self._controller_diagnostics.update(seconds(stamp), tick)
         self._controller_diagnostics.cycle_times.append(time.perf_counter() - began)
+
+    def _stop_if_implausible(self, stamp: int, q: Array, restarted: str) -> None:
+        """Stop the team, latched, if its states jump repeatedly."""
+        reason = self._supervision.jumps_repeatedly(seconds(stamp), q, restarted)
+        if reason and not self._stop_requested:
+            self.get_logger().error(f"stopped: {reason}")
+            self._controller_diagnostics.stop_reason = reason
+            self._stop_requested = True
+            self._stopped_publisher.publish(Bool(data=True))
+            self.core.stop()
 
     def _is_expired(self, stamp: int) -> bool:
         """Return True for a state too old to be answered, as after a pause of this program."""
@@ -256,7 +273,8 @@ class Controller(ScenarioNode):
     def run_once(self) -> None:
         """Wall time: process received inputs and answer the newest state if it is unanswered."""
         self._interface.poll()
-        self._hold_team(self.descriptions.problem or self._interface.problem())
+        problem = self.descriptions.problem or self._interface.problem()
+        self._hold_team(problem or self._supervision.overload)
         state = self._state
         if state is not None:
             self._now = seconds(state[0])
@@ -299,6 +317,7 @@ class Controller(ScenarioNode):
 
     def _on_resume(self, _: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._stop_requested = False
+        self._controller_diagnostics.stop_reason = ""
         self._stopped_publisher.publish(Bool(data=False))
         if problem := self._controller_diagnostics.problem:
             response.success, response.message = False, f"holding the team: {problem}"
@@ -314,6 +333,8 @@ class Controller(ScenarioNode):
     def status(self) -> tuple[Level, str, dict[str, object]]:
         """Return the state machine, cycle times, subtask conditioning and silent sources."""
         now = time.monotonic()
+        if self._state is not None and not self.lockstep:
+            self._supervision.check_rate(self._state[1])
         if self._state is None:
             age, waiting = None, self._interface.waiting_for()
         else:

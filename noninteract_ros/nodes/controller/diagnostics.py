@@ -26,6 +26,7 @@ class ControllerDiagnostics:
     Attributes:
         cycle_times: Computation times of the last ticks [s].
         problem: Reason why the team is held, or "".
+        stop_reason: Reason why the team was stopped without a request, or "".
         changed: Names of parameters changed since the start.
     """
 
@@ -36,7 +37,7 @@ class ControllerDiagnostics:
         self._silent: dict[str, bool] = {}
         self._warnings: list[str] = []
         self.cycle_times: deque[float] = deque(maxlen=1000)
-        self.problem = ""
+        self.problem = self.stop_reason = ""
         self.changed: set[str] = set()
 
     def update(self, now: float, tick: Tick) -> None:
@@ -90,6 +91,8 @@ class ControllerDiagnostics:
             return Level.ERROR, f"holding: {self.problem}", values
         if problem := self._telemetry.problem():
             return Level.ERROR, problem, values
+        if self._core.mode.stopped and self.stop_reason:
+            return Level.ERROR, f"stopped: {self.stop_reason}", values
         if self._core.mode.stopped:
             return Level.WARN, "stopped", values
         if team_status:

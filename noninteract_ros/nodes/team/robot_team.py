@@ -100,6 +100,8 @@ class RobotTeam(ScenarioNode):
                 return  # A second answer to a state that was published twice.
             self._check_command(stamp)
             self._command, self._command_received_at = (stamp, effort), time.monotonic()
+            if not self.lockstep:
+                self.timing.record(stamp, seconds(self.now_ns() - stamp))
             if self.lockstep and not self._paused:
                 self._step_when_due(effort)
 
