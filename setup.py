@@ -75,6 +75,7 @@ setup(
             *ROBOTS,
             *PEER,
             *DOCS,
+            "hypothesis>=6.150",
             "mypy>=2.4",
             "playwright>=1.60",  # Drives the console's page in Chromium, where that is installed.
             "pytest>=9.2",

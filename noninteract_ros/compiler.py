@@ -3,6 +3,7 @@
 
 import hashlib
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -28,7 +29,7 @@ def compiled(function: Function) -> Function:
 
     Arithmetic follows IEEE 754 strictly: nothing is reordered or contracted, and a division by
     zero gives inf or NaN, as in numpy. The cache lies beside the source or in the user's cache
-    folder; without a writable folder, each process compiles anew.
+    folder; without a writable folder, or on a full disk, each process compiles anew.
     """
     return _cached(numba.njit(error_model="numpy", no_cfunc_wrapper=True)(function))
 
@@ -49,8 +50,16 @@ def _cached(kernel: Any) -> Any:
         return kernel  # The Python function itself.
     try:
         kernel.enable_caching()
-    except RuntimeError:
+    except (RuntimeError, OSError):
         return kernel
     folder = Path(kernel.py_func.__code__.co_filename).parent
     kernel._cache._cache_file._source_stamp = _source_digest(folder)
+    save = kernel._cache.save_overload
+
+    def save_if_possible(*arguments: Any) -> None:
+        """Save machine code; a full or failing disk costs the next start its time, no more."""
+        with suppress(OSError):
+            save(*arguments)
+
+    kernel._cache.save_overload = save_if_possible
     return kernel

@@ -4,6 +4,8 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+MAX_FOUND, MAX_ALLOWED = 300, 1000  # Characters of the parts of an error.
+
 
 class NoninteractError(Exception):
     """Base class of all errors that this package raises."""
@@ -25,7 +27,9 @@ class ScenarioError(NoninteractError):
 
     def __str__(self) -> str:
         where = f"{self.file}: " if self.file else ""
-        return f"{where}{self.key}: found {self.found}, allowed: {self.allowed}"
+        key, found = _one_line(self.key, MAX_FOUND), _one_line(self.found, MAX_FOUND)
+        allowed = _one_line(self.allowed, MAX_ALLOWED)
+        return f"{where}{key}: found {found}, allowed: {allowed}"
 
 
 class TeamError(NoninteractError):
@@ -50,3 +54,9 @@ def one_of(names: Iterable[str], found: str = "") -> str:
     close = get_close_matches(found, names, n=1)
     ordered = close + [name for name in names if name not in close]
     return " | ".join(ordered) if ordered else "none"
+
+
+def _one_line(part: object, length: int) -> str:
+    """Return a part of an error as one line of limited length."""
+    text = " ".join(str(part).split())
+    return text if len(text) <= length else text[: length - 3] + "..."

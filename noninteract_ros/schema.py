@@ -13,6 +13,8 @@ from typing import Any, TypeVar, get_type_hints
 from noninteract_ros.errors import ScenarioError, one_of
 
 Block = TypeVar("Block")
+MAX_SHOWN = 80  # Characters of a value in an error.
+MAX_NUMBER = 1e9  # In any unit; products of larger ones are no longer accurate.
 
 
 @dataclass(frozen=True)
@@ -136,13 +138,13 @@ def convert(path: str, value: Any, hint: Any, rule: Key) -> Any:
 
 
 def _convert_item(path: str, item: Any, hint: Any, rule: Key, shown: Any) -> Any:
-    if hint is float and isinstance(item, int) and not isinstance(item, bool):
+    if hint is float and type(item) is int and abs(item) <= MAX_NUMBER:
         item = float(item)
     if type(item) is not hint:
         raise ScenarioError(path, _show(shown), type_name(hint))
     if hint in (float, int):
         too_low = item < rule.minimum or (rule.strict and item == rule.minimum)
-        if not math.isfinite(item) or too_low or item > rule.maximum:
+        if not abs(item) <= MAX_NUMBER or too_low or item > rule.maximum:
             raise ScenarioError(path, _show(shown), f"{type_name(hint)} {rule.numbers_allowed()}")
     if hint is str and rule.choices and item not in rule.choices:
         raise ScenarioError(path, _show(shown), one_of(rule.choices, item))
@@ -155,8 +157,9 @@ def _plain(value: Any) -> Any:
 
 
 def _show(value: Any) -> str:
-    text = repr(_plain(value))
-    return text if len(text) <= 80 else text[:77] + "..."
+    value = _plain(value)
+    text = repr(value[:MAX_SHOWN] if isinstance(value, (list, tuple, str)) else value)
+    return text if len(text) <= MAX_SHOWN else text[: MAX_SHOWN - 3] + "..."
 
 
 def type_name(hint: Any) -> str:

@@ -23,7 +23,10 @@ Check = Callable[[Any], bool]
 
 
 def _text(value: Any) -> bool:
-    return isinstance(value, str) and len(value) <= MAX_TEXT_LENGTH
+    if not isinstance(value, str) or len(value) > MAX_TEXT_LENGTH:
+        return False
+    # JSON can hold halves of surrogate pairs and NUL, which no message of ROS can.
+    return not any(character == "\0" or "\ud800" <= character <= "\udfff" for character in value)
 
 
 def _flag(value: Any) -> bool:
@@ -35,7 +38,7 @@ def _count(value: Any) -> bool:
 
 
 def _number(value: Any, bound: float) -> bool:
-    return type(value) in (int, float) and math.isfinite(value) and abs(value) <= bound
+    return type(value) in (int, float) and abs(value) <= bound  # False for NaN
 
 
 def _numbers(count: int, bound: float) -> Check:

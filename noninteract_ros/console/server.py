@@ -26,7 +26,8 @@ from noninteract_ros.errors import InputError, ScenarioError
 from noninteract_ros.scenario.console_settings import ConsoleSettings
 
 SOCKET = "/socket"
-HELLO_TIMEOUT = 3.0  # [s] for the first message of a page
+HELLO_TIMEOUT = 2.0  # [s] for the handshake, and for the first message of a page
+MAX_STRANGERS = 64  # Connections before their hello; beyond it, the oldest one is closed.
 MAX_BACKLOG = 2**18  # [bytes] waiting for a page, above which frames are dropped for it
 DRIVER_TIMEOUT = 5.0  # [s] without a message, after which the driver loses the lock
 POLICY, BUSY = 1008, 1013  # WebSocket close codes
@@ -92,7 +93,8 @@ class ConsoleServer:
         self._files = load_static_files()
         self._access = AccessPolicy(settings)
         self._pages: dict[int, Page] = {}
-        self._connections = self._last_number = 0
+        self._strangers: list[ServerConnection] = []
+        self._places = self._last_number = 0
         self._loop = asyncio.new_event_loop()
         self._stopped = asyncio.Event()
         self._started = threading.Event()
@@ -159,6 +161,7 @@ class ConsoleServer:
             ping_interval=5.0,
             ping_timeout=10.0,
             close_timeout=1.0,
+            open_timeout=HELLO_TIMEOUT,
             server_header=None,
             logger=logger,
         ) as server:
@@ -168,6 +171,12 @@ class ConsoleServer:
 
     def _handle_request(self, connection: ServerConnection, request: Request) -> Response | None:
         """Respond to an HTTP request; None lets a WebSocket handshake continue."""
+        try:
+            return self._respond(request)
+        except (LookupError, ValueError):  # Several hosts, or no host or path.
+            return self._reject(HTTPStatus.BAD_REQUEST, "malformed request\n")
+
+    def _respond(self, request: Request) -> Response | None:
         host = request.headers.get("Host")
         if not self._access.allows_host(host):
             return self._reject(HTTPStatus.MISDIRECTED_REQUEST, "unknown host\n")
@@ -185,16 +194,30 @@ class ConsoleServer:
         return _response(status, "text/plain", text.encode())
 
     async def _handle_connection(self, socket: ServerConnection) -> None:
-        self._connections += 1
+        """Handle a connection; only one with a valid hello takes the place of a page."""
+        self._strangers.append(socket)
         try:
-            if self._connections > self._settings.max_pages:
+            if len(self._strangers) > MAX_STRANGERS:
+                await self._close(self._strangers.pop(0), "no hello", BUSY)
+            known = await self._authenticate(socket)
+            self._leave(socket)
+            if known and self._places >= self._settings.max_pages:
                 await self._close(socket, "too many pages", BUSY)
-            elif await self._authenticate(socket):
-                await self._handle_page(socket)
+            elif known:
+                self._places += 1
+                try:
+                    await self._handle_page(socket)
+                finally:
+                    self._places -= 1
         except ConnectionClosed as end:
             self.rejected += end.sent is not None and end.sent.code != 1000
         finally:
-            self._connections -= 1
+            self._leave(socket)
+
+    def _leave(self, socket: ServerConnection) -> None:
+        """Remove a connection from those before their hello."""
+        if socket in self._strangers:
+            self._strangers.remove(socket)
 
     async def _authenticate(self, socket: ServerConnection) -> bool:
         """Return True if the first message is a hello of this version with the token."""

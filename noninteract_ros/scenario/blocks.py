@@ -21,7 +21,8 @@ from noninteract_ros.team.state_assembler import PREDICTIONS
 DEVICES = ("operator", "joy", "tracker", "keyboard")
 OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console", "tank", *DEVICES)
 LISTINGS = ("robots", "subtasks", "pushes", "surroundings")
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")  # Valid as a token of a topic name.
+# Valid as a token of a topic name, and short enough for DDS with all that is appended.
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 # Parameters that every ROS node declares itself.
 ROS_KEYS = ("use_sim_time", "start_type_description_service", "qos_overrides")
 
@@ -134,7 +135,9 @@ def named_blocks(values: Mapping[str, Any]) -> list[str]:
     for listing in LISTINGS:
         for name in _listed(listing, values.get(listing, ())):
             if not NAME.fullmatch(name) or name in reserved:
-                allowed = "names of letters, digits and _ that are not keys of a scenario"
+                allowed = (
+                    "names of at most 64 letters, digits and _ that are not keys of a scenario"
+                )
                 raise ScenarioError(listing, repr(name), allowed)
             if name in names:
                 raise ScenarioError(listing, repr(name), "unique names")

@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from noninteract_ros.errors import ScenarioError, one_of
 from noninteract_ros.scenario.scenario import Scenario
+from noninteract_ros.scenario.yaml_text import YamlTextError, parse_yaml
+from noninteract_ros.schema import join
 
 PACKAGE = "noninteract_ros"
 
@@ -36,14 +36,28 @@ def read_parameters(path: Path) -> dict[str, Any]:
     Raises:
         ScenarioError: The file is missing or is no parameter file.
     """
-    content = read_yaml(path)
-    blocks = content.values() if isinstance(content, Mapping) else ()
+    try:
+        return parameters_of(read_yaml(path))
+    except ScenarioError as error:
+        raise ScenarioError(error.key, error.found, error.allowed, str(path)) from error
+
+
+def parameters_of(content: Any) -> dict[str, Any]:
+    """Return the nested parameters of a parameter file's content, merged over all its nodes.
+
+    Raises:
+        ScenarioError: The content is that of no parameter file, or has a key twice.
+    """
     parameters: dict[str, Any] = {}
-    for block in blocks:
+    for node, block in content.items() if isinstance(content, Mapping) else ():
         if not isinstance(block, Mapping) or "ros__parameters" not in block:
-            raise ScenarioError("(file)", "no ros__parameters", "/**: ros__parameters:", str(path))
-        parameters.update(block["ros__parameters"])
-    return nest(parameters)
+            raise ScenarioError("(file)", "no ros__parameters", "/**: ros__parameters:")
+        values = block["ros__parameters"]
+        if not isinstance(values, Mapping):
+            found = "nothing" if values is None else repr(values)
+            raise ScenarioError(f"{node}.ros__parameters", found, "a block of parameters")
+        parameters = _merge(parameters, nest(values))
+    return parameters
 
 
 def read_yaml(path: Path) -> Any:
@@ -53,35 +67,47 @@ def read_yaml(path: Path) -> Any:
         ScenarioError: The file cannot be read or is no YAML.
     """
     try:
-        return yaml.safe_load(path.read_text())
+        return parse_yaml(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise ScenarioError("(file)", error.strerror, "a readable file", str(path)) from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        found = " ".join(str(error).split())
-        raise ScenarioError("(file)", found, "a YAML file", str(path)) from error
+    except UnicodeDecodeError as error:
+        raise ScenarioError("(file)", "no UTF-8 text", "a YAML file", str(path)) from error
+    except YamlTextError as error:
+        raise ScenarioError("(file)", error, "a YAML file", str(path)) from error
 
 
 def nest(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Convert dotted keys to nested blocks."""
+    """Convert dotted keys to nested blocks.
+
+    Raises:
+        ScenarioError: A key is given twice, as `a.b` and as `b` in the block `a`.
+    """
     nested: dict[str, Any] = {}
     for name, value in values.items():
-        block, *rest = name.split(".")
         if isinstance(value, Mapping):
             value = nest(value)
+        first, *rest = str(name).split(".")
         for part in reversed(rest):
             value = {part: value}
-        if isinstance(value, Mapping) and isinstance(nested.get(block), dict):
-            nested[block] = _merge(nested[block], value)
-        else:
-            nested[block] = value
+        nested = _merge(nested, {first: value}, unique=True)
     return nested
 
 
-def _merge(old: dict[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+def _merge(
+    old: Mapping[str, Any], new: Mapping[str, Any], unique: bool = False, path: str = ""
+) -> dict[str, Any]:
+    """Return nested values with others merged; with `unique` they must not have a key twice."""
     merged = dict(old)
     for key, value in new.items():
-        both = isinstance(value, Mapping) and isinstance(merged.get(key), dict)
-        merged[key] = _merge(merged[key], value) if both else value
+        name = join(path, key)
+        if key not in merged:
+            merged[key] = value
+        elif isinstance(value, Mapping) and isinstance(merged[key], Mapping):
+            merged[key] = _merge(merged[key], value, unique, name)
+        elif unique:
+            raise ScenarioError(name, "the key twice", "one value")
+        else:
+            merged[key] = value
     return merged
 
 

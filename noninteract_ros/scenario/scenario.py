@@ -99,6 +99,16 @@ class Scenario:
         Raises:
             ScenarioError: A key is invalid; the error gives its name, value and allowed values.
         """
+        try:
+            return cls._from_dict(values)
+        except (ArithmeticError, ValueError, RuntimeError) as error:
+            # numpy and Pinocchio name no key.
+            found = f"{type(error).__name__}: {error}"
+            allowed = "masses, lengths, gains and positions with which the law can be evaluated"
+            raise ScenarioError("(scenario)", found, allowed) from error
+
+    @classmethod
+    def _from_dict(cls, values: Mapping[str, Any]) -> "Scenario":
         values = {name: value for name, value in values.items() if name not in ROS_KEYS}
         named = named_blocks(values)
         general = load(General, values, ignore=(*named, *OPTIONAL))

@@ -11,6 +11,7 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import join, key
 from noninteract_ros.team.joint_coordinates import JointCoordinates
+from noninteract_ros.team.robot import position_limits
 from noninteract_ros.team.robot_topics import RobotTopics
 
 ROUNDING = 1e-9  # [m or rad] tolerance of position limits
@@ -90,6 +91,12 @@ class JointSettings(RobotTopics):
             found = f"{model.upperPositionLimit[joint]:g} for {joint_names(model)[joint]}"
             allowed = f">= {model.lowerPositionLimit[joint]:g}, its lower limit"
             raise ScenarioError(join(name, "upper_limit"), found, allowed)
+        low, high = position_limits(model)
+        if (low == high).any():  # Such as limits that a URDF leaves out, which are then 0.
+            joint = int((low == high).argmax())
+            at = f"{joint_names(model)[joint]} that can only be at {low[joint]:g}"
+            allowed = "lower_limit and upper_limit, or an entry in locked_joints"
+            raise ScenarioError(join(name, "lower_limit"), f"joint {at}", allowed)
 
 
 def joint_names(model: pin.Model) -> list[str]:

@@ -55,6 +55,13 @@ BAD: list[tuple[str, dict[str, Any]]] = [
     ("gains", {"values": [1.0] * 1000}),
     ("gains", {"values": 1.0}),
     ("pause", {"on": 1}),
+    ("law", {"law": "\ud800"}),
+    ("law", {"law": "paper\0"}),
+    ("hello", {"token": "\udfff"}),
+    ("gains", {"values": [10**1000]}),
+    ("twist", {"linear": [0.0, 0.0, 10**1000]}),
+    ("drag", {"rotation": [0, 0, 0, 10**1000]}),
+    ("drag", {"element": 10**1000}),
 ]
 
 

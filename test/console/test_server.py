@@ -2,6 +2,7 @@
 """Access control, message validation and driver lock of the console server."""
 
 import http.client
+import socket
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -256,5 +257,32 @@ def test_the_number_of_pages_is_limited(make: Callable[..., Console]) -> None:
     assert console.page().closed() == (1013, "too many pages")
     pages[0].close()
     until(lambda: console.server.pages == 1)
-    until(lambda: console.server._connections == 1)
+    until(lambda: console.server._places == 1)
     console.page().wait_for_welcome()
+
+
+def test_strangers_take_no_places(make: Callable[..., Console]) -> None:
+    """Sockets without the token leave room for a page with it, whose stop gets through."""
+    console = make(token=TOKEN, max_pages=1)
+    strangers = [console.page(token=None) for _ in range(80)]
+    page = console.page(token=TOKEN)
+    page.wait_for_welcome()
+    page.send("stop")
+    until(lambda: [kind for _, kind in console.backend.commands] == ["stop"])
+    assert strangers[0].closed() == (1013, "no hello")
+    assert strangers[-1].closed()[0] == 1008
+    for stranger in strangers:
+        stranger.close()
+
+
+@pytest.mark.parametrize(
+    "request_",
+    ["GET / HTTP/1.1\r\nHost: [::1\r\n\r\n", "GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n",
+     "GET //[ HTTP/1.1\r\nHost: localhost\r\n\r\n"],
+    ids=["host", "two hosts", "path"],
+)  # fmt: skip
+def test_a_malformed_request_is_answered(console: Console, request_: str) -> None:
+    """A request that cannot be parsed is the fault of the client."""
+    with socket.create_connection(("127.0.0.1", console.server.port), DEADLINE) as connection:
+        connection.sendall(request_.encode())
+        assert connection.recv(100).startswith(b"HTTP/1.1 400 ")

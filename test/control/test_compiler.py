@@ -32,3 +32,15 @@ def test_code_is_cached_until_what_it_calls_changes(tmp_path: Path) -> None:
     assert answer(tmp_path) == [2, 1]
     (tmp_path / "inside.py").write_text(INNER.format(5))
     assert answer(tmp_path) == [10]
+
+
+def test_a_full_disk_costs_only_time(tmp_path: Path) -> None:
+    """Where machine code cannot be saved, the process goes on with what it has compiled."""
+    shutil.copy(Path(str(compiler.__file__)), tmp_path / "compiler.py")
+    (tmp_path / "outside.py").write_text(OUTER)
+    (tmp_path / "inside.py").write_text(INNER.format(1))
+    full = "def full(*a): raise OSError(28, 'No space left on device')\n"
+    full += "import numba.core.caching as c; c.IndexDataCacheFile.save = full\n"
+    command = [sys.executable, "-c", full + ASK]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert (run.returncode, run.stdout.split()) == (0, ["2"]), run.stderr

@@ -9,16 +9,18 @@ import sys
 from pathlib import Path
 
 import pytest
+import rclpy
 import yaml
 from harness import Ros, flat, paper
 from programs import Programs
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from repository import ROOT
 from waiting import DEADLINE, until
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.nodes.common.parameter_files import dump, rewrite
+from noninteract_ros.nodes.common.parameter_files import EMPTY_LIST, dump, rewrite, write
 
 PAPER = str(ROOT / "config" / "paper.yaml")
 NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
@@ -56,14 +58,14 @@ FILES = {
 INVALID = [
     (["--params-file", "{}/absent.yaml"], "{}/absent.yaml: (file): found No such file"),
     (["--params-file", "{}/nothing.yaml"], "{}/nothing.yaml: (file): found nothing"),
-    (["--params-file", "{}/broken.yaml"], "{}/broken.yaml: (file): found while parsing"),
+    (["--params-file", "{}/broken.yaml"], "{}/broken.yaml: (file): found line 1: expected"),
     (["--params-file", "{}/mixed.yaml"], "{}/mixed.yaml: robots: found ['robot_1', 2]"),
     (["--params-file", "{}/beside.yaml"], "{}/beside.yaml: /**.rate: found 3.0"),
     (["--params-file", "{}/flat.yaml"], "{}/flat.yaml: rate: found 3.0"),
     (["--params-file", "{}/value.yaml"], "{}/value.yaml: /**.ros__parameters: found 5"),
     (["--params-file", "{}/null.yaml"], "{}/null.yaml: rate: found nothing"),
     (["--params-file", "{}/nested.yaml"], "{}/nested.yaml: rate: found [[1], [2]]"),
-    (["--params-file", "{}/date.yaml"], "{}/date.yaml: rate: found datetime.date"),
+    (["--params-file", "{}/date.yaml"], "{}/date.yaml: rate: found '20"),
     (["--params-file", "{}/typo.yaml"], "{}/typo.yaml: cooperative.stifness: found an unknown"),
     (["--params-file", "{}/nan.yaml"], "{}/nan.yaml: cooperative.damping: found [nan]"),
     (["--params-file", "{}/size.yaml"], "{}/size.yaml: relative.damping: found [1.0, 2.0, 3.0]"),
@@ -173,8 +175,26 @@ def test_every_key_is_a_parameter_with_a_description(ros: Ros) -> None:
     )
     rate, axes, edges, authority = (parameter_value_to_python(item) for item in answer.values)
     assert (rate, axes, edges, authority) == (1000.0, ["x", "y"], ["robot_1", "robot_2"], "human")
+    everything = GetParameters.Request(names=listed)  # As `ros2 param dump` requests it.
+    values = ros.call(GetParameters, "robot_team/get_parameters", everything).values
+    answered = dict(zip(listed, map(parameter_value_to_python, values), strict=True))
+    assert (answered["lockstep_sources"], answered["surroundings"]) == ([], [])
     change = SetParameters.Request(parameters=[Parameter("rate", value=5.0).to_parameter_msg()])
     assert not ros.call(SetParameters, "robot_team/set_parameters", change).results[0].successful
+
+
+def test_texts_and_empty_lists_reach_the_nodes(tmp_path: Path) -> None:
+    """The parser of ROS keeps a path with ` #` and `: ` whole, and an empty list."""
+    file = write(tmp_path / "a #1.yaml", {"sources": [], "rate": 1e3})
+    arguments = ["", *ROS_ARGS, str(file), "-p", "output:=trial #2/a: b", "-p", "pushes:=[]"]
+    context = rclpy.Context()
+    rclpy.init(args=rewrite(arguments, tmp_path), context=context, domain_id=0)
+    node = Node("reader", context=context, automatically_declare_parameters_from_overrides=True)
+    found = {name: item.value for name, item in node.get_parameters_by_prefix("").items()}
+    node.destroy_node()
+    context.shutdown()
+    assert found["output"] == "trial #2/a: b"
+    assert (found["sources"], found["pushes"], found["rate"]) == (EMPTY_LIST, EMPTY_LIST, 1000.0)
 
 
 def test_the_last_value_wins_whatever_its_type(tmp_path: Path) -> None:

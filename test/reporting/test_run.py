@@ -10,12 +10,17 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Quaternion, Transform, Twist, Vector3, WrenchStamped
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, String
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 
-from noninteract_ros.errors import RecordingError
+from noninteract_ros.errors import RecordingError, ScenarioError
+from noninteract_ros.nodes.common.parameter_files import dump
+from noninteract_ros.reporting.recording.recorded import scenario_of
 from noninteract_ros.reporting.recording.run import Run
 from noninteract_ros.reporting.recording.writer import RunWriter
+from noninteract_ros.scenario import Scenario
+from noninteract_ros.team.models.planar_arm import PlanarArm
+from noninteract_ros.team.models.urdf_text import urdf_text
 
 
 def type_name(message: Any) -> str:
@@ -291,3 +296,27 @@ def test_invalid_files_are_rejected(tmp_path: Path) -> None:
         path.write_bytes(content)
         with pytest.raises(RecordingError, match=reason):
             Run.open(path)
+
+
+def test_the_recorded_description_replaces_a_missing_file(tmp_path: Path) -> None:
+    """A scenario with URDF files is analysed by the descriptions that the team published."""
+    block = PlanarArm(link_lengths=(0.5, 0.5), link_masses=(1.0, 1.0), mass_location="centre")
+    description = urdf_text(block.build("arm"))
+    arm = {"model": "urdf", "urdf": "moved.urdf", "tool_frame": "tool"}
+    impedance = {"stiffness": [100.0], "damping": [40.0], "authority": "hold"}
+    values: dict[str, Any] = {
+        "robots": ["a", "b"],
+        "a": {**arm, "initial_position": [1.4, -1.2]},
+        "b": {**arm, "initial_position": [0.9, 1.2], "base_pose": [1, 0, 0, 0, 0, 0, 1]},
+        "subtasks": ["lead", "gap"],
+        "lead": {"kind": "cooperative_position", **impedance},
+        "gap": {"kind": "relative_position", **impedance},
+    }
+    with RunWriter(tmp_path / "run.mcap", dump({"/**": {"ros__parameters": values}})) as writer:
+        for robot in ("a", "b"):
+            data = serialize_message(String(data=description))
+            writer.add(f"/team/{robot}/robot_description", "std_msgs/msg/String", 1, 0, data)
+    with pytest.raises(ScenarioError, match=r"moved\.urdf"):
+        Scenario.from_dict(values)
+    scenario = scenario_of(Run.open(tmp_path))
+    assert scenario.team.n == 4

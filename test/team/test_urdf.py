@@ -1,17 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 """Robots from URDF: dynamics, bases, locked and continuous joints, limits, and what is refused."""
 
+import re
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 import pytest
 import yaml
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from planar_arms import UNLIKE, PlanarArms
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario.files import load_scenario
 from noninteract_ros.schema import load
+from noninteract_ros.subtasks.kinds.posture import Posture
 from noninteract_ros.team.models import urdf_files as urdf_files
 from noninteract_ros.team.models.planar_arm import PlanarArm
 from noninteract_ros.team.models.point_mass import PointMass
@@ -20,6 +24,14 @@ from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.team import Team
 
 STEP = 1e-6
+SNIPPETS = st.sampled_from(
+    [
+        "", "<", ">", "/>", '"', "&", "&#0;", "&lt;", "<!--", "-->", "<![CDATA[", "]]>", "</link>",
+        "<robot>", "</robot>", '<link name="upper"/>', "<mimic/>", "<inertial/>", "<limit/>", "é",
+        "0", "-1", "1,0", "1e300", "nan", "inf", " 1 2", "upper", "shoulder", "tip", "continuous",
+        "fixed", "prismatic", "floating", "<x>" * 500, "9" * 400, "\x00", "\ud800", "<?xml ?>",
+    ]
+)  # fmt: skip
 PANDA = "example-robot-data/panda_description/urdf/panda.urdf"
 UR5 = "package://example-robot-data/robots/ur_description/urdf/ur5_robot.urdf"
 KINOVA = "example-robot-data/kinova_description/robots/kinova.urdf"
@@ -390,6 +402,100 @@ def test_a_joint_that_moves_no_mass_is_refused():
     assert "elbow" in error.found
     assert "armature" in error.allowed
     assert build(urdf_text=massless, armature=[0.0, 0.1]).model.nv == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('<mass value="1.0"/>', '<mass value="1,0"/>', "link 'upper' with <mass value='1,0'>"),
+        ('<mass value="1.0"/>', '<mass value=""/>', "link 'upper' with <mass value=''>"),
+        ('<mass value="1.0"/>', '<mass value="nan"/>', "link 'upper' with <mass value='nan'>"),
+        ('<mass value="1.0"/>', '<mass value="-1"/>', "link 'upper' with the mass -1"),
+        ('<mass value="1.0"/>', "", "link 'upper' with <inertial> without <mass>"),
+        ('ixx="0"', "", "link 'upper' with <inertia ixx=''>"),
+        ('lower="-2"', 'lower="-2 rad"', "joint 'shoulder' with <limit lower='-2 rad'>"),
+        ('xyz="0 0 1"', 'xyz="0 1"', "joint 'shoulder' with <axis xyz='0 1'>"),
+    ],
+)
+def test_what_is_not_understood_is_refused(old, new, words):
+    """A part that the parser of URDFs would drop or misread is an error with link or joint."""
+    error = refused(urdf_text=planar().replace(old, new, 1))
+    assert error.key == "arm.urdf_text"
+    assert words in str(error.found)
+
+
+def test_an_inertial_without_inertia_is_refused():
+    """A link has no rotational inertia of 0 by omission."""
+    text = re.sub("<inertia [^>]*>", "", planar(), count=1)
+    assert "without <inertia>" in str(refused(urdf_text=text).found)
+    text = re.sub("<inertial>.*?</inertial>", "<inertial/>", planar(), count=1)
+    assert "without <mass>" in str(refused(urdf_text=text).found)
+
+
+@pytest.mark.parametrize("ends", ['lower="0" upper="0"', ""])
+def test_a_joint_without_range_is_refused(ends):
+    """Limits that a URDF leaves out are 0; the joint would be walled in."""
+    text = planar().replace('lower="-2" upper="2.5"', ends, 1)
+    error = refused(urdf_text=text)
+    assert error.key == "arm.lower_limit"
+    assert error.found == "joint shoulder that can only be at 0"
+    assert "locked_joints" in error.allowed
+    ranges = {"lower_limit": [-1.0], "upper_limit": [1.0]}
+    assert build(urdf_text=text, **ranges).model.nv == 2
+    assert build(urdf_text=text, locked_joints=["shoulder"]).model.nv == 1
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        planar().replace("<robot ", '<robot xmlns="http://www.ros.org" ').encode(),
+        b'<?xml version="1.0" encoding="iso-8859-1"?><!-- \xe9 -->' + planar().encode(),
+        b'\n <?xml version="1.0"?>' + planar().encode(),
+        b"\xef\xbb\xbf" + planar().encode(),
+        planar().replace("<link", "<!-- a -- b --><link", 1).encode(),
+    ],
+    ids=["namespace", "encoding", "leading blank", "byte order mark", "comment"],
+)
+def test_files_are_read_as_by_the_tools_of_robots(tmp_path, data):
+    """Namespaces, declared encodings, leading blanks and any comment are accepted."""
+    file = tmp_path / "arm.urdf"
+    file.write_bytes(data)
+    assert build(urdf=str(file)).model.nv == 2
+
+
+def test_a_fixed_joint_may_mimic():
+    """A fixed joint has no motion, so its <mimic> means nothing."""
+    text = planar().replace('type="fixed">', 'type="fixed"><mimic joint="shoulder"/>')
+    assert "mimic" in text
+    assert build(urdf_text=text).model.nv == 2
+
+
+def test_names_are_listed_in_order():
+    """Lists of allowed names are sorted, after the closest one, and have no universe."""
+    assert refused(urdf_text=planar(), tool_frame="x").allowed == (
+        "base | elbow | lower | shoulder | tip | upper | wrist"
+    )
+    assert refused(urdf_text=planar(), locked_joints=["x"]).allowed.endswith("elbow | shoulder")
+    team = Team([build("a", urdf_text=planar()), build("b", urdf_text=planar(kind="continuous"))])
+    with pytest.raises(ScenarioError) as caught:
+        Posture("posture", ("b/elbow",)).build("posture", team)
+    assert caught.value.found == "'b/elbow', a continuous joint"
+    assert caught.value.allowed == "a/elbow | a/shoulder | b/shoulder"
+
+
+@settings(max_examples=1000, deadline=None, derandomize=True, database=None)
+@given(data=st.data())
+def test_mutations(data):
+    """A URDF with slices replaced is read or refused; nothing else is raised."""
+    text = planar()
+    for _ in range(data.draw(st.integers(1, 3))):
+        start = data.draw(st.integers(0, len(text)))
+        size = data.draw(st.sampled_from([0, 1, 2, 8, 40]))
+        text = text[:start] + data.draw(SNIPPETS) + text[start + size :]
+    try:
+        build(urdf_text=text)
+    except ScenarioError as error:
+        assert error.key.startswith("arm")  # noqa: PT017
 
 
 def test_a_mimicking_joint_may_be_locked():

@@ -9,7 +9,7 @@ from typing import Any
 
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from noninteract_ros.errors import ScenarioError
@@ -17,6 +17,8 @@ from noninteract_ros.scenario.blocks import description_topics, load_robot
 
 # Latched: subscribers that join later receive the last message too.
 LATCHED_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+# Publishers that repeat their message need not be latched, nor reliable.
+REPEATED_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 REPORT_PERIOD = 0.5  # [s] between diagnostics while a node waits
 LOG_PERIOD = 5.0  # [s] between log lines while a node waits
 
@@ -47,7 +49,8 @@ class RobotDescriptions:
         self._topics = description_topics(values)
         for robot, topic in self._topics.items():
             callback = partial(self._on_description, robot, topic)
-            node.create_subscription(String, topic, callback, LATCHED_QOS)
+            for qos in (LATCHED_QOS, REPEATED_QOS):
+                node.create_subscription(String, topic, callback, qos)
 
     def wait(self, report: Report, timeout: float = float("inf")) -> dict[str, Any]:
         """Wait for all descriptions, spinning the node in a temporary executor.

@@ -5,23 +5,31 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray
-from rcl_interfaces.msg import ParameterDescriptor
+from geometry_msgs.msg import PoseStamped, TwistStamped, WrenchStamped
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.clock import Clock, ClockType
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.executors import ExternalShutdownException
 from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy, qos_policy_name_from_kind
 from rclpy.task import Future
+from sensor_msgs.msg import Joy
 
-from noninteract_ros.errors import InputError
+from noninteract_ros.errors import InputError, NoninteractError
 from noninteract_ros.nodes.common.descriptions import RobotDescriptions
 from noninteract_ros.nodes.common.loop_timing import LoopTiming
 from noninteract_ros.nodes.common.message_time import ROUNDING, ClockMonitor, StampChecker
+from noninteract_ros.nodes.common.parameter_files import EMPTY_LIST
 from noninteract_ros.nodes.common.program import until_shutdown
+from noninteract_ros.nodes.messages.cdr import deserialize
 from noninteract_ros.nodes.messages.messages import Level, to_diagnostics, to_status
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.files import nest
@@ -29,6 +37,10 @@ from noninteract_ros.scenario.files import nest
 NAMESPACE = "team"
 # Reliable, and deep enough that a subscriber that is blocked for a while misses no tick.
 LOOP_QOS = QoSProfile(depth=1000)
+# Connects to publishers of either reliability; a lost set-point is replaced by the next one.
+SENSOR_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
+SENSOR_TYPES = (PoseStamped, TwistStamped, WrenchStamped, Joy)
+MAX_REASON = 200  # Characters of an unexpected error.
 DIAGNOSTICS_PERIOD = 0.5
 STEADY_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LOG_PERIOD = 2.0
@@ -66,15 +78,20 @@ class ScenarioNode(Node):
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         kwargs.setdefault("namespace", NAMESPACE)
+        # Before the parameter services, which `create_service` guards.
+        self._rejected: Counter[str] = Counter()
+        self._last_rejection = "none"
+        self._mismatches: dict[str, str] = {}
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
-        given = {key: item.value for key, item in self.get_parameters_by_prefix("").items()}
+        given = {
+            key: [] if item.value == EMPTY_LIST else item.value
+            for key, item in self.get_parameters_by_prefix("").items()
+        }
         self._diagnostics_publisher = self.create_publisher(DiagnosticArray, "/diagnostics", 10)
         self.descriptions = RobotDescriptions(self, nest(given), self.on_description_changed)
         self.shutdown_requested: Callable[[], bool] = lambda: False
         self.loop_inputs: list[Any] = []
         self._destroyed = False
-        self._rejected: Counter[str] = Counter()
-        self._last_rejection = "none"
         # Nothing of a node can be built before its robots are known.
         self.values = self.descriptions.wait(self._report_waiting)
         self.scenario = Scenario.from_dict(self.values)
@@ -83,6 +100,7 @@ class ScenarioNode(Node):
         self._clock_monitor = ClockMonitor(self.now_ns)
         general = self.scenario.general
         self.timing = LoopTiming(general.rate, general.state_timeout)
+        self.add_on_set_parameters_callback(self._refuse_clock)
         self.create_wall_timer(DIAGNOSTICS_PERIOD, self.publish_diagnostics)
 
     def _declare_parameters(self) -> None:
@@ -97,10 +115,22 @@ class ScenarioNode(Node):
                 # The rule checks live changes with a better error text than ROS.
                 dynamic_typing=rule.live and self.LIVE,
             )
-            # An empty list has no type, so it is declared but left unset.
-            empty = None if descriptor.dynamic_typing else EMPTY_TYPES.get(hint)
-            typed = empty if value == () else _plain(value)
-            self.declare_parameter(name, typed, descriptor, ignore_override=True)
+            if value == ():
+                self._declare_empty(name, EMPTY_TYPES[hint], descriptor)
+            else:
+                self.declare_parameter(name, _plain(value), descriptor, ignore_override=True)
+
+    def _declare_empty(
+        self, name: str, type_: Parameter.Type, descriptor: ParameterDescriptor
+    ) -> None:
+        """Declare an empty list, whose type rclpy cannot infer from its value.
+
+        A parameter that is left unset would empty every answer of the parameter services.
+        """
+        self.declare_parameter(name, type_, ignore_override=True)
+        self.set_parameters([Parameter(name, type_, [])])
+        descriptor.type = type_.value
+        self.set_descriptor(name, descriptor)
 
     def now_ns(self) -> int:
         """Return the time of the clock of the node [ns]."""
@@ -139,6 +169,8 @@ class ScenarioNode(Node):
                 level, text = max(level, Level.WARN), f"{text}; {jump}"
         if problem := self.descriptions.problem:
             level, text = Level.ERROR, text if problem in text else f"{problem}; {text}"
+        if mismatches := list(self._mismatches.values()):
+            level, text = max(level, Level.WARN), f"{text}; {'; '.join(mismatches)}"
         self._publish_status(level, text, values)
 
     def on_description_changed(self) -> None:
@@ -165,7 +197,7 @@ class ScenarioNode(Node):
         callback: Callable[[Any], None],
         *,
         raw: bool = False,
-        qos: QoSProfile = LOOP_QOS,
+        qos: QoSProfile | None = None,
     ) -> None:
         """Subscribe to a topic; reject messages for which the callback raises an InputError.
 
@@ -174,26 +206,93 @@ class ScenarioNode(Node):
             topic: Topic name.
             callback: Called with each message; with serialized bytes if `raw`.
             raw: True to skip deserialization.
-            qos: Quality of service.
+            qos: Quality of service; by default reliable, but best effort in wall time for the
+                types of sensors and devices, whose drivers publish so.
+        """
+        if qos is None:
+            sensor = message_type in SENSOR_TYPES and not self.lockstep
+            qos = SENSOR_QOS if sensor else LOOP_QOS
+
+        def received(data: bytes) -> None:
+            def handle() -> None:
+                callback(data if raw else deserialize(data, message_type))
+
+            self._guard(topic, handle)
+
+        events = SubscriptionEventCallbacks(incompatible_qos=partial(self._on_mismatch, topic))
+        # Deserialization is behind the guard too.
+        self.create_subscription(
+            message_type, topic, received, qos, raw=True, event_callbacks=events
+        )
+
+    def _on_mismatch(self, topic: str, event: Any) -> None:
+        """Report a publisher that DDS does not connect."""
+        policy = _policy_name(event.last_policy_kind)
+        self._mismatches[topic] = f"a publisher of {topic} is not received: its {policy} differs"
+        self.get_logger().warning(self._mismatches[topic], once=True)
+
+    def create_service(self, srv_type: Any, srv_name: str, callback: Any, **kwargs: Any) -> Any:
+        """Create a service that answers each request, whatever the callback raises.
+
+        It also guards the parameter services, which `rclpy.node.Node` creates by this method.
         """
 
-        def checked(message: Any) -> None:
-            with until_shutdown(self.context):
-                try:
-                    callback(message)
-                except InputError as error:
-                    self.reject_input(topic, str(error))
+        def answer(request: Any, response: Any) -> Any:
+            answered = [_refusal(srv_type, request)]
 
-        self.create_subscription(message_type, topic, checked, qos, raw=raw)
+            def handle() -> None:
+                if srv_type is SetParameters:
+                    answered[0].results = [
+                        self._set_one(callback, item) for item in request.parameters
+                    ]
+                else:
+                    answered[0] = callback(request, response)
+
+            self._guard(srv_name, handle)
+            return answered[0]
+
+        return super().create_service(srv_type, srv_name, answer, **kwargs)
+
+    def _set_one(self, callback: Any, item: Any) -> SetParametersResult:
+        """Set one parameter of a request; a malformed one is refused by itself."""
+        results = [SetParametersResult(successful=False, reason="not a parameter")]
+
+        def handle() -> None:
+            request = SetParameters.Request(parameters=[item])
+            results[0] = callback(request, SetParameters.Response()).results[0]
+
+        self._guard("set_parameters", handle)
+        return results[0]
+
+    def _refuse_clock(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse another clock: times of the old one would be compared with those of the new."""
+        if any(item.name == "use_sim_time" for item in parameters):
+            reason = "use_sim_time: found a change, allowed: a value at the start of the program"
+            return SetParametersResult(successful=False, reason=reason)
+        return SetParametersResult(successful=True)
 
     def create_wall_timer(self, period: float, callback: Callable[[], None]) -> None:
         """Create a timer with a period [s] of wall time, whatever clock the node uses."""
+        self.create_timer(period, partial(self._guard, "a timer", callback), clock=STEADY_CLOCK)
 
-        def guarded() -> None:
-            with until_shutdown(self.context):
-                callback()
+    def _guard(self, source: str, work: Callable[[], None]) -> None:
+        """Do work for a message, a request or a timer; nothing that is received ends a program.
 
-        self.create_timer(period, guarded, clock=STEADY_CLOCK)
+        Args:
+            source: Topic or service, for diagnostics.
+            work: Called once. What it raises is counted and reported as a rejection.
+        """
+        with until_shutdown(self.context):
+            try:
+                work()
+            except InputError as error:
+                self.reject_input(source, str(error))
+            except (NoninteractError, ExternalShutdownException):
+                raise
+            except Exception as error:
+                if not self.context.ok():
+                    raise
+                self.reject_input(source, f"{type(error).__name__}: {error}"[:MAX_REASON])
 
     def reject_input(self, topic: str, reason: str) -> None:
         """Count and log a rejected input."""
@@ -258,6 +357,21 @@ class ScenarioNode(Node):
             thread.join(JOIN_TIMEOUT)
         if failures:
             raise failures[0]
+
+
+def _refusal(srv_type: Any, request: Any) -> Any:
+    """Return the response that refuses a request."""
+    response = srv_type.Response()
+    if srv_type is SetParametersAtomically:
+        response.result = SetParametersResult(successful=False, reason="not parameters")
+    elif hasattr(response, "message"):
+        response.message = "the request failed"
+    return response
+
+
+def _policy_name(kind: Any) -> str:
+    """Return the name of a QoS policy, as in `reliability`."""
+    return qos_policy_name_from_kind(int(kind)).lower()
 
 
 def _plain(value: Any) -> Any:

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameter files, checked and rewritten before ROS parses them.
 
-Errors are reported in one line. Two pitfalls of the parser of ROS are removed: it takes `y` for a
-boolean, which rejects `axes: [x, y]`, and `[0, 1.5]` for a list of mixed types.
+Errors are reported in one line. Three pitfalls of the parser of ROS are removed: it takes `y` for
+a boolean, which rejects `axes: [x, y]`, and `[0, 1.5]` for a list of mixed types, and it drops
+empty lists. Those become lists of one empty text, which `ScenarioNode` reads as empty.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,16 +14,23 @@ from typing import Any
 import yaml
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.scenario.files import read_yaml
+from noninteract_ros.scenario.files import nest, read_yaml
+from noninteract_ros.scenario.yaml_text import YamlTextError, parse_yaml
 
 OPTION = "--params-file"
 OVERRIDES = ("-p", "--param")
 COMMAND_LINE = "-p"
 EVERY_NODE = "/**"
+TEXT_KEYS = ("output", "scenario_file", "urdf")  # On a command line their values need no quotes.
+EMPTY_LIST = [""]  # The parser of ROS drops lists without items.
 
 
 class _Quoted(yaml.SafeDumper):
     """YAML dumper that quotes every string, so that no parser takes it for another type."""
+
+    def ignore_aliases(self, data: object) -> bool:
+        """Return True: the parser of ROS knows no aliases."""
+        return True
 
 
 _Quoted.add_representer(
@@ -76,17 +84,19 @@ def _drop_overridden(block: Mapping[str, Any], given: set[tuple[str, str]], node
 
 
 def _rewrite_override(text: str) -> str:
-    """Return `key:=value` with a list value rewritten for the parser of ROS."""
+    """Return `key:=value` with a list, or the value of a text key, for the parser of ROS."""
     key, separator, written = text.partition(":=")
     try:
-        value = yaml.safe_load(written)
-    except yaml.YAMLError:
-        return text  # ROS reports the error.
-    if not isinstance(value, list):
+        value = parse_yaml(written)
+    except YamlTextError:
+        value = None  # ROS reports the error, except for a text.
+    if key.rpartition(":")[2].rpartition(".")[2] in TEXT_KEYS:
+        value = value if written[:1] in ("'", '"') and isinstance(value, str) else written
+    elif not isinstance(value, list):
         return text
     _check_leaf(key, value, COMMAND_LINE)
     dumped = yaml.dump(_plain(value), Dumper=_Quoted, default_flow_style=True, width=10**6)
-    return key + separator + dumped.strip()
+    return key + separator + dumped.removesuffix("...\n").strip()
 
 
 def dump(content: Mapping[str, Any]) -> str:
@@ -136,6 +146,11 @@ def _check_node(name: str, block: Any, path: str) -> None:
             _check_node(f"{name}.{key}", value, path)
         elif not isinstance(value, Mapping):
             raise ScenarioError(f"{name}.{key}", repr(value), "a block of parameters", path)
+        else:
+            try:
+                nest(value)
+            except ScenarioError as error:
+                raise ScenarioError(error.key, error.found, error.allowed, path) from error
 
 
 def _leaves(block: Mapping[Any, Any], path: str = "") -> Iterator[tuple[str, Any]]:
@@ -158,9 +173,9 @@ def _check_leaf(key: str, value: Any, path: str) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Return the content with lists of mixed integers and floats converted to floats."""
+    """Return the content with mixed numbers converted to floats, and empty lists marked."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if isinstance(value, list) and {type(item) for item in value} == {int, float}:
         return [float(item) for item in value]
-    return value
+    return EMPTY_LIST if value == [] else value

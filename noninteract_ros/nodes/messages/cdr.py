@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
-from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 
 from noninteract_ros.arrays import Array
@@ -22,10 +22,10 @@ Message = TypeVar("Message")
 SECOND = 10**9
 MAX_MAGNITUDE = 1e9  # in any unit
 QUANTITIES = ("position", "velocity", "effort")
-PADDING = 8  # bytes that middleware may append or omit at the end
 ENCAPSULATION = b"\x00\x01\x00\x00"  # plain CDR, little-endian, no options
+PADDING = 16  # bytes after a message: middleware overestimates the size of empty sequences
 STAMP = struct.Struct("<iI")
-FORMATS = {"int32": "<i", "uint32": "<I", "double": "<d"}
+FORMATS = {"int32": "<i", "uint32": "<I", "float": "<f", "double": "<d", "boolean": "<?"}
 
 
 def join_stamp(sec: int, nanosec: int) -> int:
@@ -42,18 +42,25 @@ def join_stamp(sec: int, nanosec: int) -> int:
 def deserialize(data: bytes, message_type: type[Message]) -> Message:
     """Return the message object of serialized bytes.
 
+    The middleware reads missing sequences of a truncated message as empty. Such a message, and one
+    with many bytes after its end, is rejected by its length.
+
     Raises:
         InputError: The bytes are not a message of this type.
     """
+    name = message_type.__name__
+    layout = _Layout()
     try:
         message: Message = deserialize_message(bytes(data), message_type)
-    except RuntimeError as error:
-        raise InputError(f"the bytes are not a {message_type.__name__}") from error
-    # Sequences that were cut off are read as empty ones.
-    size = len(serialize_message(message))
-    if abs(len(data) - size) > PADDING:
-        text = f"{len(data)} bytes for a {message_type.__name__} of {size} bytes"
-        raise InputError(text)
+    except Exception as error:  # Also texts that are no UTF-8.
+        raise InputError(f"the bytes are not a {name}") from error
+    try:
+        layout.add_message(message)
+    except AttributeError:  # Fields that no message of the loop has.
+        return message
+    size = len(ENCAPSULATION) + len(layout.data)
+    if not 0 <= len(data) - size <= PADDING:
+        raise InputError(f"{len(data)} bytes of a {name} of {size} bytes")
     return message
 
 
@@ -156,7 +163,7 @@ class CdrTemplate:
         Raises:
             InputError: The stamp is not a time.
         """
-        if not self._end <= len(data) <= self._end + PADDING or data[:2] != ENCAPSULATION[:2]:
+        if not 0 <= len(data) - self._end <= PADDING or data[:2] != ENCAPSULATION[:2]:
             return None
         words = np.frombuffer(data[4 : 4 + self._room].ljust(self._room, b"\0"), "<u8")
         if (words & self._mask).tobytes() != self._expected:

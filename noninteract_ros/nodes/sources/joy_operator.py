@@ -19,7 +19,8 @@ from noninteract_ros.subtasks.reference import Reference
 class JoyOperator(OperatorNode):
     """Node that commands rates while the enable button is held.
 
-    Without an enable button, it commands rates while the device is deflected.
+    Without an enable button, it commands rates while the device is deflected. A device counts
+    only once each mapped axis was in its dead zone.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -27,12 +28,15 @@ class JoyOperator(OperatorNode):
         settings = self.scenario.joy or JoySettings()
         self._mapping = JoyMapping(settings)
         self._stick: Array = np.zeros(6)
+        # Drivers report deflections that nobody holds until the first event of an axis.
+        self._rested: Any = False
         self.subscribe(Joy, settings.topic, self._on_joy)
 
     def _on_joy(self, message: Joy) -> None:
         stick, held = self._mapping.read(message.axes, message.buttons)
         self._stick = stick
-        self.dead_man.update(time.monotonic(), held)
+        self._rested = self._rested | self._mapping.at_rest(message.axes)
+        self.dead_man.update(time.monotonic(), held and bool(np.all(self._rested)))
 
     def command(self, now: float, desired: Reference) -> None:
         """Publish a rate proportional to the deflection."""

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Program `pose_operator`: set-points from the pose of a haptic device or tracker."""
 
+import math
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -35,7 +36,7 @@ class PoseOperator(OperatorNode):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("pose_operator", **kwargs)
         settings = self.scenario.tracker or TrackerSettings()
-        self._max_jump = settings.largest_jump
+        self._max_jump, self._max_turn = settings.largest_jump, settings.largest_turn
         self._mounting = _mounting(settings)
         self._button = settings.clutch_button
         self._clutch, self._pressed = False, DeadManSwitch(self.settings.hold_timeout)
@@ -72,6 +73,10 @@ class PoseOperator(OperatorNode):
             if jump > self._max_jump:
                 self.dead_man.release()
                 raise InputError(f"the pose jumped by {jump:.3g} m: clutch released")
+            turn = 2.0 * math.acos(min(1.0, abs(float(pose[3:] @ before[3:]))))
+            if turn > self._max_turn:
+                self.dead_man.release()
+                raise InputError(f"the pose turned by {turn:.3g} rad at once: clutch released")
         self.dead_man.update(now, held)
 
     def command(self, now: float, desired: Reference) -> None:

@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import yaml
 from numpy.typing import NDArray
 
 from noninteract_ros.arrays import Array
@@ -18,9 +17,13 @@ from noninteract_ros.reporting.recording.run import Run
 from noninteract_ros.reporting.recording.series import JointSeries, TrajectorySeries
 from noninteract_ros.scenario import Scenario
 from noninteract_ros.scenario.blocks import description_topics
-from noninteract_ros.scenario.files import nest
+from noninteract_ros.scenario.files import parameters_of
+from noninteract_ros.scenario.yaml_text import YamlTextError, parse_yaml
 from noninteract_ros.subtasks.subtask import Subtask
+from noninteract_ros.team.models.urdf_robot import TOPIC
 from noninteract_ros.team.robot import AXES
+
+DESCRIPTION = "robot_description"
 
 INTERVENTIONS = "interventions"
 FRICTION = "joint friction is unknown to the law and not measured at the tools"
@@ -243,26 +246,32 @@ def scenario_of(run: Run) -> Scenario:
     if run.scenario is None:
         raise RecordingError(f"{run.path}: no scenario: the run cannot be analysed")
     try:
-        values = _parameters(yaml.safe_load(run.scenario))
+        values = parameters_of(parse_yaml(run.scenario))
         return Scenario.from_dict(_described(run, values))
-    except (ScenarioError, yaml.YAMLError, KeyError, TypeError, AttributeError) as error:
+    except (ScenarioError, YamlTextError) as error:
         reason = " ".join(str(error).split())
         raise RecordingError(f"{run.path}: invalid scenario: {reason}") from error
 
 
-def _parameters(content: Any) -> Mapping[str, Any]:
-    merged: dict[str, Any] = {}
-    for block in content.values():
-        merged.update(block["ros__parameters"])
-    return nest(merged)
-
-
 def _described(run: Run, values: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the scenario with the robot descriptions that were received on topics."""
+    """Return the scenario with the robot descriptions of the recording.
+
+    These are the ones received on topics, and those that the team published of the URDF files,
+    which may have moved or changed since.
+    """
     described = dict(values)
-    for robot, topic in description_topics(values).items():
+    topics = description_topics(values)
+    for robot, block in values.items():
+        topic = f"{robot}/{DESCRIPTION}"
+        recorded = any(name.endswith(f"/{topic}") for name in run.topics)
+        if isinstance(block, Mapping) and block.get("urdf") and recorded:
+            topics.setdefault(robot, topic)
+    for robot, topic in topics.items():
         for message in run.messages(topic):
-            described[robot] = {**described[robot], "urdf_text": message.data}
+            block = {**values[robot], "urdf_text": message.data}
+            if not str(block["urdf"]).startswith(TOPIC):
+                del block["urdf"]
+            described[robot] = block
             break  # Nodes reject later descriptions.
     return described
 

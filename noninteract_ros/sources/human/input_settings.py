@@ -73,6 +73,9 @@ class TrackerSettings:
     largest_jump: float = key(
         "Distance between two poses beyond which the clutch is released [m]", 0.1, positive=True
     )
+    largest_turn: float = key(
+        "Rotation between two poses beyond which the clutch is released [rad]", 0.5, positive=True
+    )
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ import re
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError, ScenarioError
@@ -34,10 +35,16 @@ class JoyMapping:
     def __init__(self, settings: JoySettings, path: str = "joy") -> None:
         self._settings = settings
         self._terms = [_terms(join(path, name), getattr(settings, name)) for name in DIRECTIONS]
-        self._axes = max(
-            (number + 1 for terms in self._terms for _, kind, number in terms if kind == "axis"),
-            default=0,
-        )
+        self._mapped = {
+            number for terms in self._terms for _, kind, number in terms if kind == "axis"
+        }
+        self._axes = max(self._mapped, default=-1) + 1
+
+    def at_rest(self, axes: Sequence[float]) -> NDArray[np.bool_]:
+        """Return True for each axis that is in its dead zone or not mapped, shape (axes,)."""
+        resting = np.abs(np.array(axes, dtype=float)[: self._axes]) <= self._settings.deadzone
+        resting[list(set(range(self._axes)) - self._mapped)] = True
+        return resting
 
     def read(self, axes: Sequence[float], buttons: Sequence[int]) -> tuple[Array, bool]:
         """Convert a message to deflections and the state of the dead-man's switch.

@@ -35,15 +35,19 @@ class Posture:
         """
         able = {
             joint_name: (joint.idx_q, joint.idx_v)
-            for joint_name, joint in zip(team.model.names, team.model.joints, strict=True)
+            for joint_name, joint in zip(
+                team.joint_names, list(team.model.joints)[1:], strict=True
+            )
             if joint.nq == joint.nv == 1
         }
+        known = sorted(able)
         path = f"{name}.joints"
         if not self.joints or len(set(self.joints)) != len(self.joints):
-            raise ScenarioError(path, list(self.joints), f"different ones of {one_of(able)}")
+            raise ScenarioError(path, list(self.joints), f"different ones of {one_of(known)}")
         for joint in self.joints:
             if joint not in able:
-                raise ScenarioError(path, repr(joint), one_of(able, joint))
+                kind = ", a continuous joint" if joint in team.joint_names else ""
+                raise ScenarioError(path, repr(joint) + kind, one_of(known, joint))
         indices = [able[joint] for joint in self.joints]
         units = tuple(team.units[in_v] for _, in_v in indices)
         return JointSelection(name, self.joints, indices, units, team.n)

@@ -2,6 +2,7 @@
 """Lookup of URDF files: on disk, in ROS packages, in example-robot-data."""
 
 import os
+import re
 import sys
 from difflib import get_close_matches
 from pathlib import Path
@@ -9,6 +10,7 @@ from pathlib import Path
 from noninteract_ros.errors import ScenarioError
 
 SCHEME = "package://"
+DECLARATION = re.compile(rb"""\s*<\?xml[^>]*\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
 EXAMPLES = "example-robot-data"
 INSTALL = "pip install 'noninteract_ros[robots]'"
 
@@ -27,8 +29,12 @@ def read_urdf(key: str, name: str) -> str:
     """
     path = _find(key, name)
     try:
-        return path.read_text()
-    except (OSError, UnicodeDecodeError) as error:
+        data = path.read_bytes()
+        # As the declaration of XML has it; by default, and with a byte order mark, UTF-8.
+        declared = DECLARATION.match(data)
+        text = data.decode(declared[1].decode() if declared else "utf-8-sig")
+        return text.lstrip()
+    except (OSError, UnicodeError, LookupError) as error:
         found = f"{name!r}: {getattr(error, 'strerror', None) or 'no text'}"
         raise ScenarioError(key, found, "a readable URDF file") from error
 
