@@ -52,7 +52,7 @@ class General:
         "Sources that the controller waits for in lockstep, as <subtask>/<source>", ()
     )
     lockstep_timeout: float = key(
-        "Wall time after which a silent lockstep source is no longer waited for [s]",
+        "Wall time after which a silent lockstep source or sensor is no longer waited for [s]",
         5.0,
         positive=True,
     )

@@ -199,8 +199,9 @@ class Controller(ScenarioNode):
         self._now = seconds(self._state[0])
         self._missing = self._sources.missing(self._now, self._waiting_since)
         if not self._missing:
-            self._missing = self._telemetry.missing(self._state[0])
+            self._missing = self._telemetry.missing(self._state[0], self._waiting_since)
         if not self._missing:
+            self._hold_team(self.descriptions.problem or self._sensor_problem())
             self._answer(*self._state)
 
     def _answer(self, stamp: int, q: Array, v: Array, applied: Array | None) -> None:
@@ -274,7 +275,10 @@ class Controller(ScenarioNode):
         """Wall time: process received inputs and answer the newest state if it is unanswered."""
         self._interface.poll()
         problem = self.descriptions.problem or self._interface.problem()
-        self._hold_team(problem or self._supervision.overload)
+        if self._state is not None:
+            self._telemetry.check_sensors()
+        problem = problem or self._supervision.overload or self._sensor_problem()
+        self._hold_team(problem)
         state = self._state
         if state is not None:
             self._now = seconds(state[0])
@@ -290,6 +294,13 @@ class Controller(ScenarioNode):
         """Hold the team until a restart, since the model no longer matches the robots."""
         if self.lockstep:
             self._hold_team(self.descriptions.problem)
+
+    def _sensor_problem(self) -> str:
+        """Return why the force regulated with silent sensors must be released, or ""."""
+        silent = sorted(self._telemetry.silent_sensors)
+        if not silent or not self.core.mode.impedance.goal_gain.any():
+            return ""
+        return f"no external_wrench of {', '.join(silent)}, by which a force is regulated"
 
     def _hold_team(self, problem: str) -> None:
         """Hold the team, as a stop does, while there is a problem that may disappear by itself."""
@@ -345,7 +356,8 @@ class Controller(ScenarioNode):
             age=age,
             team_status=self._team_status.reason,
             waiting=waiting,
-            absent=self._sources.absent,
+            absent=self._sources.absent
+            | {f"{name}/external_wrench" for name in self._telemetry.silent_sensors},
         )
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Topics published by the controller: subtask states, feedback, energies."""
 
+import time
 from collections.abc import Callable
 from functools import partial
 
@@ -21,6 +22,7 @@ from noninteract_ros.nodes.messages.messages import EnergyCodec, SubtaskCodec, e
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
+SENSOR_PERIODS = 5  # of wrenches, least silence that is a timeout
 ACCOUNT_LABELS = ("time", *QUANTITIES)
 
 
@@ -39,6 +41,7 @@ class Telemetry:
 
     Attributes:
         safety: Activity of singularities and joint limits.
+        silent_sensors: Robots whose force sensor has timed out.
         wrenches: Newest wrenches on the tools, shape (N, 6) [N, N m]; zero without a sensor.
     """
 
@@ -60,6 +63,9 @@ class Telemetry:
         self.wrenches = np.zeros((len(team.names), 6))
         self._stamps = node.stamp_checker(team_time)
         self._wrench_stamps = dict.fromkeys(general.force_sensors, -1)
+        timeout = general.lockstep_timeout if node.lockstep else general.state_timeout
+        self._sensor_timeout = max(timeout, SENSOR_PERIODS * self._period / self._rate)
+        self.silent_sensors: set[str] = set()
         for name in general.force_sensors:
             callback = partial(self._on_wrench, name)
             node.subscribe(WrenchStamped, f"{name}/external_wrench", callback)
@@ -89,6 +95,7 @@ class Telemetry:
         self._stamps.accept(robot, stamp)
         self.wrenches[self._team.index(robot)] = wrench
         self._wrench_stamps[robot] = stamp
+        self.silent_sensors.discard(robot)
 
     def reset(self) -> None:
         """Discard the stamps of received wrenches, and reset limit activity and energy sums."""
@@ -96,6 +103,7 @@ class Telemetry:
         self.safety.reset()
         self._team_energy.reset()
         self._wrench_stamps = dict.fromkeys(self._wrench_stamps, -1)
+        self.silent_sensors.clear()
 
     def discard_ahead(self, stamp: int) -> None:
         """Discard wrenches received before the first state that are ahead of its stamp [ns]."""
@@ -105,13 +113,30 @@ class Telemetry:
                 self._wrench_stamps[robot] = -1
                 self._stamps.discard(robot)
 
-    def missing(self, stamp: int) -> list[str]:
-        """Return the wrench topics still awaited by the tick with this stamp [ns]."""
+    def missing(self, stamp: int, waiting_since: float) -> list[str]:
+        """Return the wrench topics still awaited by the tick with this stamp [ns].
+
+        A sensor that has timed out is not awaited until its next wrench.
+
+        Args:
+            stamp: Stamp of the tick [ns].
+            waiting_since: Monotonic time at which the state of the tick was received [s].
+        """
         tick = round(seconds(stamp) * self._rate)
         if tick % self._period:
             return []
-        stamps = self._wrench_stamps.items()
-        return [f"{name}/external_wrench" for name, newest in stamps if newest < stamp]
+        late = {name for name, newest in self._wrench_stamps.items() if newest < stamp}
+        if late and time.monotonic() - waiting_since > self._sensor_timeout:
+            self.silent_sensors |= late
+            self.wrenches[[self._team.index(name) for name in late]] = 0.0
+        return [f"{name}/external_wrench" for name in sorted(late - self.silent_sensors)]
+
+    def check_sensors(self) -> None:
+        """Wall time: zero the wrenches of sensors that have been silent for the timeout."""
+        for name in self._wrench_stamps:
+            if self._stamps.silence(name) > self._sensor_timeout:
+                self.silent_sensors.add(name)
+                self.wrenches[self._team.index(name)] = 0.0
 
     def publish(self, stamp: int, core: TeamController, tick: Tick) -> None:
         """Publish a tick with the stamp [ns] of the state it answers."""
