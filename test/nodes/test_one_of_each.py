@@ -175,3 +175,15 @@ def test_the_team_can_be_stopped_without_a_controller(ros: Ros) -> None:
     assert np.abs(monitor.newest().effort).max() != 3.0
     assert ros.call(Trigger, "robot_team/resume").success
     until(moves, "the torque of the command again")
+
+
+def test_a_second_commander_is_named_in_lockstep(ros: Ros) -> None:
+    """The error has both names."""
+    values = paper(**(ALONE | {"lockstep": True}))
+    monitor = ros.monitor(values)
+    ros.make("robot_team", values)
+    ros.make("controller", values)
+    until(lambda: monitor.commands)
+    Stranger(ros, monitor, "joint_commands")
+    monitor.wait_for_status("robot_team", "/team/controller, /team/stranger")
+    assert monitor.status["robot_team"][0] == 2

@@ -29,6 +29,7 @@ from noninteract_ros.nodes.common.loop_timing import LoopTiming
 from noninteract_ros.nodes.common.message_time import ROUNDING, ClockMonitor, StampChecker
 from noninteract_ros.nodes.common.parameter_files import EMPTY_LIST
 from noninteract_ros.nodes.common.program import until_shutdown
+from noninteract_ros.nodes.common.publisher_binding import PublisherWatch
 from noninteract_ros.nodes.messages.cdr import deserialize
 from noninteract_ros.nodes.messages.messages import Level, to_diagnostics, to_status
 from noninteract_ros.scenario import Scenario
@@ -69,6 +70,7 @@ class ScenarioNode(Node):
         lockstep: True where each tick waits for the command that answers its state.
         descriptions: Robot descriptions received on topics.
         loop_inputs: Inputs that the loop polls itself.
+        publisher_watch: Lockstep: report of a second publisher, where the node has one.
         timing: Wall time: answers to states, recorded by controller and team.
         shutdown_requested: Return True after SIGINT or SIGTERM; for loops of nodes that handle
             their own shutdown.
@@ -91,6 +93,7 @@ class ScenarioNode(Node):
         self.descriptions = RobotDescriptions(self, nest(given), self.on_description_changed)
         self.shutdown_requested: Callable[[], bool] = lambda: False
         self.loop_inputs: list[Any] = []
+        self.publisher_watch: PublisherWatch | None = None
         self._destroyed = False
         # Nothing of a node can be built before its robots are known.
         self.values = self.descriptions.wait(self._report_waiting)
@@ -159,6 +162,10 @@ class ScenarioNode(Node):
         for item in self.loop_inputs:
             item.refresh()
         level, text, values = self.status()
+        if self.publisher_watch is not None:
+            self.publisher_watch.refresh()
+            if second := self.publisher_watch.problem():
+                level, text = Level.ERROR, f"{text}; {second}"
         if not self.lockstep:
             self._clock_monitor.update()
             values |= self.timing.values()

@@ -94,5 +94,32 @@ class PublisherBinding:
         return f"{self._topic} has {len(names)} publishers: {', '.join(sorted(names))}"
 
 
+class PublisherWatch:
+    """Report of a second publisher of a topic, in lockstep, where only simulated robots move.
+
+    Args:
+        node: Node that subscribes.
+        topic: Topic name.
+    """
+
+    def __init__(self, node: Node, topic: str) -> None:
+        self._node, self._topic = node, node.resolve_topic_name(topic)
+        self._names: list[str] = []
+
+    def refresh(self) -> None:
+        """Read the publishers of the topic from the graph."""
+        if self._node.count_publishers(self._topic) < 2:
+            self._names = []
+            return
+        found = self._node.get_publishers_info_by_topic(self._topic)
+        self._names = sorted(_full_name(item) for item in found)
+
+    def problem(self) -> str:
+        """Return the error text of a topic with several publishers, or ""."""
+        if len(self._names) < 2:
+            return ""
+        return f"{self._topic} has {len(self._names)} publishers: {', '.join(self._names)}"
+
+
 def _full_name(publisher: TopicEndpointInfo) -> str:
     return f"{publisher.node_namespace.rstrip('/')}/{publisher.node_name}"

@@ -8,6 +8,7 @@ from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.common.efforts import EffortPublishers
 from noninteract_ros.nodes.common.loop_input import LoopInput
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.nodes.common.publisher_binding import PublisherWatch
 from noninteract_ros.nodes.controller.robot_states import RobotStates, StateCallback
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.team.team import Team
@@ -44,6 +45,7 @@ class TeamInterface:
             self._robots = RobotStates(node, team, on_state)
         elif node.lockstep:
             node.subscribe(JointState, "joint_states", self.receive, raw=True)
+            node.publisher_watch = PublisherWatch(node, "joint_states")
         else:
             self.states = LoopInput(node, JointState, "joint_states")
 

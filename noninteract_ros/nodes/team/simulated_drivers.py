@@ -20,6 +20,7 @@ from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.common.efforts import EffortCodec
 from noninteract_ros.nodes.common.loop_input import LoopInput
 from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.nodes.common.publisher_binding import PublisherWatch
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import WORLD, to_stamp
 from noninteract_ros.simulation.team_simulation import TeamSimulation
@@ -108,6 +109,7 @@ class SimulatedDrivers:
             self._receive_commands = partial(self._on_commands, shared, codec)
             if node.lockstep:
                 node.subscribe(JointState, "joint_commands", self._receive_commands, raw=True)
+                node.publisher_watch = PublisherWatch(node, "joint_commands")
             else:
                 self._commands = LoopInput(node, JointState, "joint_commands")
 
