@@ -478,9 +478,29 @@ def test_names_are_listed_in_order():
     assert refused(urdf_text=planar(), locked_joints=["x"]).allowed.endswith("elbow | shoulder")
     team = Team([build("a", urdf_text=planar()), build("b", urdf_text=planar(kind="continuous"))])
     with pytest.raises(ScenarioError) as caught:
-        Posture("posture", ("b/elbow",)).build("posture", team)
-    assert caught.value.found == "'b/elbow', a continuous joint"
-    assert caught.value.allowed == "a/elbow | a/shoulder | b/shoulder"
+        Posture("posture", ("b/wrist",)).build("posture", team)
+    assert caught.value.found == "'b/wrist'"
+    assert sorted(caught.value.allowed.split(" | ")) == [
+        "a/elbow",
+        "a/shoulder",
+        "b/elbow",
+        "b/shoulder",
+    ]
+
+
+def test_a_posture_of_continuous_joints_goes_the_shorter_way_round():
+    """The coordinate of a continuous joint is an angle; its error is at most half a turn."""
+    team = Team([build("a", urdf_text=planar()), build("b", urdf_text=planar(kind="continuous"))])
+    task = Posture("posture", ("a/elbow", "b/elbow")).build("posture", team)
+    q = team.configuration_from_joints(np.array([0.1, 0.2, 0.3, 3.0]))
+    found = task.evaluate(team.state(q, np.zeros(4)))
+    np.testing.assert_allclose(found.x, [0.2, 3.0], rtol=1e-12)
+    np.testing.assert_array_equal(found.J, np.eye(4)[[1, 3]])
+    error = task.difference(found.x, np.array([0.0, -3.0]))
+    np.testing.assert_allclose(error, [0.2, 6.0 - 2.0 * np.pi], rtol=1e-12)
+    turned = team.integrate(q, np.array([0.0, 0.0, 0.0, 0.2]))
+    value = task.evaluate(team.state(turned, np.zeros(4))).x[1]
+    assert value == pytest.approx(3.2 - 2.0 * np.pi)
 
 
 @settings(max_examples=1000, deadline=None, derandomize=True, database=None)
