@@ -3,12 +3,14 @@
 
 import signal
 import threading
+import time
 from typing import Any
 
 import numpy as np
 import pytest
 from harness import Ros, merged
 from programs import Programs
+from rclpy.qos import QoSProfile, qos_profile_sensor_data
 from repository import ROOT
 from std_msgs.msg import String
 from waiting import DEADLINE, until
@@ -151,6 +153,26 @@ def test_a_scenario_that_does_not_fit_a_description_is_an_error(ros: Ros, publis
     controller = NodeInThread(ros, "controller", on_topics(left={"tool_frame": "hand"}))
     with pytest.raises(ScenarioError, match=r"left.tool_frame: found 'hand', allowed: .*tool"):
         until(controller.constructed, "the error")
+
+
+def test_descriptions_of_volatile_publishers_are_received(ros: Ros) -> None:
+    """A publisher that repeats its message need not be latched, nor reliable."""
+    waiting = NodeInThread(ros, "controller", on_topics())
+    publishers = {
+        topic: ros.probe.create_publisher(String, topic, qos)
+        for topic, qos in zip(
+            TOPICS.values(), (QoSProfile(depth=1), qos_profile_sensor_data), strict=True
+        )
+    }
+    texts = dict(zip(TOPICS.values(), TEXTS.values(), strict=True))
+
+    def repeated() -> bool:
+        for topic, publisher in publishers.items():
+            publisher.publish(String(data=texts[topic]))
+        time.sleep(0.1)
+        return waiting.constructed()
+
+    until(repeated, "both descriptions")
 
 
 def test_a_scenario_read_without_ros_needs_a_description() -> None:

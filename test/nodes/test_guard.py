@@ -13,6 +13,7 @@ from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterValue
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
+from rclpy.qos import qos_profile_sensor_data
 from rclpy.serialization import serialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Header, String
@@ -116,3 +117,20 @@ def test_a_failing_callback_is_counted(ros: Ros) -> None:
     publisher.publish(String(data="unforeseen"))
     until(lambda: node._rejected["failing"] == 1, "the rejection")
     assert node._last_rejection == "failing: ValueError: unforeseen"
+
+
+def test_publishers_of_other_qos_are_received_or_named(ros: Ros) -> None:
+    """Best effort suffices for a push in wall time; a loop topic names what does not fit."""
+    node = ros.make("robot_team", paper(lockstep=False, lockstep_sources=None))
+    received: list[WrenchStamped] = []
+    node.subscribe(WrenchStamped, "sensed", received.append)
+    node.subscribe(String, "commanded", received.append)
+    sensor = ros.probe.create_publisher(WrenchStamped, "sensed", qos_profile_sensor_data)
+    ros.wait_for_subscribers(sensor)
+    sensor.publish(WrenchStamped())
+    until(lambda: received, "the wrench")
+    ros.probe.create_publisher(String, "commanded", qos_profile_sensor_data)
+    until(lambda: node._mismatches, "the mismatch")
+    assert node._mismatches == {
+        "commanded": "a publisher of commanded is not received: its reliability differs"
+    }
