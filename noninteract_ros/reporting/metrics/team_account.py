@@ -41,9 +41,9 @@ class TeamAccount:
         residual: Growth of all storage beyond all received energy [J].
         received: Work of the environment since the start of the account [J].
         measured: Integral of `supplied` since then [J].
-        brought: Energy injected by moving references since then [J].
-        credit: Energy granted for moving references since then [J].
-        refilled: Energy granted by an operator since then [J].
+        brought: Energy injected by moving references and force inputs since then [J].
+        credit: Tank energy granted for that since then [J].
+        refilled: Energy granted by an operator to tank and reserve since then [J].
         lost: Energy withheld or discarded since then [J].
         account: Number of the account; all sums restart with it.
     """
