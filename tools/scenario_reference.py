@@ -45,6 +45,7 @@ BLOCKS: dict[str, type] = {
         for name in (
             "tank",
             "safety",
+            "walls",
             "planner",
             "haptic",
             "link",

@@ -4,13 +4,14 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.active_law import ActiveLaw
 from noninteract_ros.control.energy.external_torque import ExternalTorque
-from noninteract_ros.control.energy.gate import GATED, EnergyGate, TickTerms
+from noninteract_ros.control.energy.gate import GATED, SIGMAS, EnergyGate, TickTerms
 from noninteract_ros.control.energy.stiffness_ramp import StiffnessRamp
 from noninteract_ros.control.energy.storage import Energy, energy
 from noninteract_ros.control.energy.tank import TankSettings
@@ -33,8 +34,12 @@ from noninteract_ros.control.safety.singularity import SingularityGuard, best_re
 from noninteract_ros.control.safety.singularity_escape import SingularityEscape
 from noninteract_ros.control.safety.stop import Stop
 from noninteract_ros.control.tick import Mode, Tick
+from noninteract_ros.control.walls.wall_guard import WallGuard
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
+
+if TYPE_CHECKING:
+    from noninteract_ros.control.walls.walls import Walls
 
 DEFAULT_SAFETY, DEFAULT_TANK = SafetySettings(), TankSettings()
 
@@ -55,6 +60,7 @@ class TeamController:
         tank: Capacity, levels and rates of the energy account.
         measured: Whether wrenches on the tools will be given; else a momentum observer estimates
             what acts from outside.
+        walls: Constraints that joints and bodies keep, or None.
     """
 
     def __init__(
@@ -70,6 +76,7 @@ class TeamController:
         safety: SafetySettings = DEFAULT_SAFETY,
         tank: TankSettings = DEFAULT_TANK,
         measured: bool = True,
+        walls: "Walls | None" = None,
     ) -> None:
         self.team, self.stack = team, stack
         self._layout = CompiledLayout(stack.layout)
@@ -89,6 +96,7 @@ class TeamController:
         scout = SingularityEscape(team, stack, best, safety.singularity_begin)
         self._guard = SingularityGuard(team, safety, best, scout)
         self._safety = JointSafety(team, safety)
+        self._walls = WallGuard(team, stack, walls, tank.observer_gain) if walls else None
 
     @cached_property
     def _view(self) -> TeamEvaluator:
@@ -206,6 +214,8 @@ class TeamController:
             self._guard.reset()
             self._goals.forget()
             self.outside.reset()
+            if self._walls:
+                self._walls.reset()
             self.gate.pause()
         led = tuple(
             item.hold(now) if stopped else item.advance(now, step) for item in self.inputs.values()
@@ -214,6 +224,9 @@ class TeamController:
         relative = min(regular, self.stack.singularity_distance(seen.state))
         share = self._guard.law_share(relative)
         self.outside.see(step, q, v, applied)
+        if self._walls:
+            self._walls.update(step, seen, applied)
+            led = self._walls.governed(led, self._mode.stopped, share == 1.0)
         changing = self._law.changing(now) or self._springs.changing
         moment = self._moment(now, seen, led, share, step)
         if share == 1.0:
@@ -223,11 +236,22 @@ class TeamController:
             self._mode, self._view, seen, moment, share, recovery
         )
         asked = seen.dynamics.torque(seen.state.v, wanted)
-        torque, safety = self._safety.protect(q, v, asked, seen.state.g, elapsed)
+        walled = asked
+        if self._walls:
+            sigma = SIGMAS.get(self._mode.law, self.gate.tank.sigma) * share
+            passive, paid = self._walls.forces(asked, 0.0 if self._mode.stopped else sigma)
+            if paid.any():
+                asked = asked + paid
+                wanted = wanted + np.linalg.solve(seen.state.M, paid)
+                acceleration = seen.dynamics.acceleration_of(seen.state.v, wanted)
+            walled = asked + passive if passive.any() else asked
+        torque, safety = self._safety.protect(q, v, walled, seen.state.g, elapsed)
         self._law.remember(self._mode, moment, torque, acceleration, share, safety)
         self._regulate(seen, wrenches, step, held=share < 1.0 or safety.acted)
         self._continuity.note(now, q)
         self.outside.note(torque)
+        if self._walls:
+            self._walls.record(torque)
         return Tick(
             torque,
             seen.state,
@@ -246,6 +270,7 @@ class TeamController:
             self.gate.account,
             self._mode.law,
             bool(restarted) or self._mode.stopped or changing,
+            self._walls.report() if self._walls else None,
         )
 
     def _regulate(self, seen: Evaluation, wrenches: Array | None, step: float, held: bool) -> None:

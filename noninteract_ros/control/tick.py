@@ -9,6 +9,7 @@ from noninteract_ros.control.law.decoupling import TaskDynamics, TaskError
 from noninteract_ros.control.law.impedance import Impedance
 from noninteract_ros.control.references.subtask_input import SubtaskCommand
 from noninteract_ros.control.safety.joint_limits import SafetyReport
+from noninteract_ros.control.walls.state import WallReport
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import TeamState
 
@@ -50,8 +51,9 @@ class Tick:
         restarted: Why every subtask was put to rest where it is, or an empty text.
         account: The energy account as of this tick, kept whatever the law.
         law: Law in force.
-        in_transition: Whether the torque is not that of this law and these gains alone: a change
-            of them fades in, the team is or was stopped, or it was put to rest where it is.
+        in_transition: True where the torque is not that of this law and these gains alone: a
+            change fades, the team is or was stopped, or every subtask holds anew.
+        walls: Walls at this tick; None without any.
     """
 
     torque: Array
@@ -71,8 +73,10 @@ class Tick:
     account: EnergyAccount
     law: str
     in_transition: bool
+    walls: WallReport | None = None
 
     @property
     def intervened(self) -> bool:
-        """Whether the torque is another one than the law's."""
-        return self.law_share < 1.0 or self.safety.acted or self.account.closing
+        """True where the torque is another one than the law's."""
+        pushed = self.walls is not None and self.walls.active > 0
+        return pushed or self.law_share < 1.0 or self.safety.acted or self.account.closing

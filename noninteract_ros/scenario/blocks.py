@@ -19,7 +19,16 @@ from noninteract_ros.team.models.urdf_robot import TOPIC
 from noninteract_ros.team.state_assembler import PREDICTIONS
 
 DEVICES = ("operator", "joy", "tracker", "keyboard")
-OPTIONAL = ("object", "haptic", "link", "planner", "safety", "console", "tank", *DEVICES)
+OPTIONAL = ("object", "haptic", "link", "planner", "safety", "walls", "console", "tank", *DEVICES)
+# Order of giving way by kind of subtask: a grasp last, postures first.
+ORDERS = {
+    "relative_position": 0,
+    "relative_orientation": 0,
+    "relative_pose": 0,
+    "posture": 2,
+    "elbow_angle": 2,
+}
+ORDER = 1
 LISTINGS = ("robots", "subtasks", "pushes", "surroundings")
 # Valid as a token of a topic name, and short enough for DDS with all that is appended.
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
@@ -122,6 +131,12 @@ class SubtaskSpec:
     kind: SubtaskBlock
     impedance: ImpedanceSettings
     input: InputSettings
+
+    @property
+    def order(self) -> int:
+        """Order of giving way at walls: of a later one first."""
+        given = self.input.priority
+        return given if given >= 0 else ORDERS.get(getattr(self.kind, "kind", ""), ORDER)
 
 
 def named_blocks(values: Mapping[str, Any]) -> list[str]:

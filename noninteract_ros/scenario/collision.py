@@ -1,26 +1,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """Collision geometry of a scenario: robots, what they hold, obstacles."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
 
 from noninteract_ros.errors import ScenarioError
-from noninteract_ros.scenario.scenario import Scenario
 from noninteract_ros.schema import join
-from noninteract_ros.simulation.environment import RigidObject
+from noninteract_ros.simulation.environment import RigidObject, SurroundingBlock
 from noninteract_ros.team.geometry.bodies import Body, convex_body, link_bodies, moved
 from noninteract_ros.team.geometry.clearance import CollisionGeometry
 from noninteract_ros.team.geometry.fitting import capsule_around
 from noninteract_ros.team.geometry.hulls import box
 from noninteract_ros.team.geometry.links import urdf_shapes
 from noninteract_ros.team.geometry.obstacles import Obstacle
+from noninteract_ros.team.models.registry import RobotBlock
 from noninteract_ros.team.models.urdf_robot import UrdfRobot
 from noninteract_ros.team.team import Team
 
 
-def collision_geometry(scenario: Scenario, team: Team) -> CollisionGeometry:
+def collision_geometry(
+    robots: Mapping[str, RobotBlock], surroundings: Mapping[str, SurroundingBlock], team: Team
+) -> CollisionGeometry:
     """Return the bodies of a scenario and the pairs of them that can collide.
 
     A link is a capsule around its collision meshes, and for robots without meshes a capsule
@@ -31,7 +34,7 @@ def collision_geometry(scenario: Scenario, team: Team) -> CollisionGeometry:
     """
     bodies: list[Body] = []
     for robot in team.robots:
-        block, shapes = scenario.robots[robot.name], []
+        block, shapes = robots[robot.name], []
         if isinstance(block, UrdfRobot):
             try:
                 shapes = list(urdf_shapes(block.description(robot.name), robot))
@@ -41,7 +44,7 @@ def collision_geometry(scenario: Scenario, team: Team) -> CollisionGeometry:
                     path, f"a mesh ({error})", "meshes that are installed"
                 ) from error
         bodies += link_bodies(robot, shapes, team)
-    for name, surrounding in scenario.surroundings.items():
+    for name, surrounding in surroundings.items():
         if isinstance(surrounding, Obstacle):
             bodies.append(surrounding.body(name))
         elif isinstance(surrounding, RigidObject):

@@ -4,12 +4,13 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from noninteract_ros.control.controller import TeamController
 from noninteract_ros.control.energy.tank import TankSettings
 from noninteract_ros.control.references.inputs import SOURCES
 from noninteract_ros.control.safety.settings import SafetySettings
+from noninteract_ros.control.walls.settings import WallSettings
 from noninteract_ros.errors import ScenarioError, SubtaskError, TeamError, one_of
 from noninteract_ros.scenario.blocks import (
     OPTIONAL,
@@ -46,6 +47,10 @@ from noninteract_ros.subtasks.subtask import Subtask
 from noninteract_ros.team.models.registry import RobotBlock
 from noninteract_ros.team.team import Team
 
+if TYPE_CHECKING:
+    from noninteract_ros.control.walls.walls import Walls
+    from noninteract_ros.team.geometry.clearance import CollisionGeometry
+
 
 @dataclass(frozen=True)
 class Scenario:
@@ -63,6 +68,7 @@ class Scenario:
         pushes: Scheduled pushes, by name.
         surroundings: Objects, doors and walls, by name.
         safety: Behaviour at singularities and joint limits.
+        walls: Distances that bodies and joints keep, or None.
         console: Operator's console, or None.
         tank: Energy tank.
         operator: Settings common to all input devices, or None.
@@ -85,6 +91,7 @@ class Scenario:
     pushes: Mapping[str, ScheduledPush]
     surroundings: Mapping[str, SurroundingBlock]
     safety: SafetySettings
+    walls: WallSettings | None
     console: ConsoleSettings | None
     tank: TankSettings
     operator: OperatorSettings | None
@@ -132,6 +139,7 @@ class Scenario:
                 for name in general.surroundings
             },
             safety=load_optional(SafetySettings, values, "safety") or SafetySettings(),
+            walls=load_optional(WallSettings, values, "walls"),
             console=load_optional(ConsoleSettings, values, "console"),
             tank=load_optional(TankSettings, values, "tank") or TankSettings(),
             operator=load_optional(OperatorSettings, values, "operator"),
@@ -147,6 +155,7 @@ class Scenario:
         blocks += [("object", self.held), ("haptic", self.haptic), ("link", self.link)]
         blocks.append(("tank", self.tank))
         blocks += [("planner", self.planner), ("safety", self.safety), ("console", self.console)]
+        blocks += [("walls", self.walls)]
         blocks += [("operator", self.operator), ("joy", self.joy), ("tracker", self.tracker)]
         blocks += [("keyboard", self.keyboard)]
         blocks += [(f"planner.{name}", block) for name, block in self.formations.items()]
@@ -223,6 +232,22 @@ class Scenario:
         except SubtaskError as error:
             raise ScenarioError("subtasks", list(self.subtasks), str(error)) from error
 
+    def build_scene(self, team: Team) -> "CollisionGeometry":
+        """Return the bodies of robots and surroundings, and the pairs that can collide."""
+        from noninteract_ros.scenario.collision import collision_geometry  # Loads the compiler.
+
+        return collision_geometry(self.robots, self.surroundings, team)
+
+    def build_walls(self, team: Team, stack: SubtaskStack) -> "Walls | None":
+        """Return the walls between these bodies and at the joints' limits, if there are any."""
+        if self.walls is None:
+            return None
+        from noninteract_ros.control.walls.walls import Walls  # Loads the compiler.
+
+        orders = [spec.order for spec in self.subtasks.values()]
+        scene = self.build_scene(team)
+        return Walls(team, stack, orders, scene, self.walls, 1.0 / self.general.rate)
+
     def build_controller(self, team: Team, stack: SubtaskStack) -> TeamController:
         """Build the controller."""
         return TeamController(
@@ -237,6 +262,7 @@ class Scenario:
             self.safety,
             self.tank,
             measured=bool(self.general.force_sensors),
+            walls=self.build_walls(team, stack),
         )
 
     def build_simulation(self, team: Team, stack: SubtaskStack) -> TeamSimulation:

@@ -149,9 +149,7 @@ def _loops(loops: list[Loop]) -> Section:
 
 def _clearances(scenario: Scenario, team: Team) -> Section:
     """Return the nearest pairs of bodies at the start, and the pairs that are left out."""
-    from noninteract_ros.scenario.collision import collision_geometry  # Loads the compiler.
-
-    scene = collision_geometry(scenario, team)
+    scene = scenario.build_scene(team)
     found = scene.evaluate(team.q0, np.zeros(team.n))
     nearest = np.argsort(found.distances)[:NEAREST]
     left_out = [("overlap", scene.pairs.always), ("always apart", scene.pairs.never)]

@@ -10,7 +10,6 @@ from repository import ROOT
 
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.scenario import Scenario
-from noninteract_ros.scenario.collision import collision_geometry
 from noninteract_ros.scenario.files import read_parameters
 from noninteract_ros.scenario.shapes import shapes_of
 
@@ -30,7 +29,7 @@ def scenario(name: str, **obstacles: dict[str, Any]) -> Scenario:
 def least(found: Scenario) -> dict[str, float]:
     """Smallest distance of each obstacle from any robot at the start [m]."""
     team = found.build_team()
-    scene = collision_geometry(found, team)
+    scene = found.build_scene(team)
     clearances = scene.evaluate(team.q0, np.zeros(team.n))
     result: dict[str, float] = {}
     for distance, pair in zip(clearances.distances, clearances.pairs, strict=True):
@@ -97,7 +96,7 @@ def test_two_pandas_are_bodies_with_the_box_they_hold() -> None:
     """Links are capsules; the held box touches the hands by design and is no pair with them."""
     found = scenario("dual_panda")
     team = found.build_team()
-    scene = collision_geometry(found, team)
+    scene = found.build_scene(team)
     names = [body.name for body in scene.bodies]
     assert len(names) == 23
     assert "box" in names

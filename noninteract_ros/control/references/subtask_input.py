@@ -53,6 +53,12 @@ class InputSettings:
     max_jerk: tuple[float, ...] = key(
         "Jerk bound of shaped motions [m/s^3; rad/s^3]", (50.0,), positive=True
     )
+    priority: int = key(
+        "Order of giving way at walls, the highest number first; -1: 0 for relative subtasks,"
+        " 2 for postures, 1 for others",
+        -1,
+        minimum=-1,
+    )
     max_wrench: tuple[float, ...] = key("Bound of a force input [N; N m]", (50.0,), positive=True)
     max_wrench_rate: tuple[float, ...] = key(
         "Rate bound of a force input [N/s; N m/s]", (500.0,), positive=True

@@ -55,6 +55,8 @@ class LimitActivity:
         yield "regularity, lowest", tick.regularity
         yield "effort share, lowest", tick.safety.effort_share
         yield "torque rate share, lowest", tick.safety.rate_share
+        if tick.walls is not None and tick.walls.nearest:
+            yield "clearance, lowest [m]", tick.walls.least
         if tick.account.gated:
             yield "sigma, lowest", tick.account.tank.sigma
             yield "grip, lowest", tick.account.tank.grip
@@ -72,6 +74,8 @@ class LimitActivity:
         yield from _gates(tick.account)
         for joint in safety.repelled:
             yield f"{self._joints[joint]} at its position limit"
+        if tick.walls is not None and tick.walls.active:
+            yield f"walls push: {tick.walls.nearest or 'joints at their limits'}"
         for joint in safety.too_fast:
             yield f"{self._joints[joint]} too fast"
 

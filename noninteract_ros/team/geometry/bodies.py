@@ -28,8 +28,9 @@ class Body:
         joint: Joint of the body in the team's model; 0 is the world.
         capsule: Shape of the body, or a capsule around it if it is convex; for a plane, a point of
             it and the point one normal above.
-        convex: Convex coal geometry in the joint's frame; None for a capsule and for a plane.
-        plane: True for a half-space, which is fixed to the world.
+        convex: Geometry of coal in the joint's frame; None for a capsule and for a plane.
+        hull: Convex hull of a link that a capsule stands for, in the joint's frame; None without.
+        plane: True for a half-space, which belongs to the world.
         touches: Joints whose bodies it touches by design, such as those of grippers.
     """
 
@@ -38,6 +39,7 @@ class Body:
     joint: int
     capsule: Capsule
     convex: Any = None
+    hull: Any = None
     plane: bool = False
     touches: frozenset[int] = frozenset()
 
@@ -50,16 +52,13 @@ def convex_body(points: Array) -> Any:
     return coal.Convex.convexHull(corners, True, "Qt")
 
 
-def link_bodies(
-    robot: Robot, shapes: Sequence[LinkShape], team: Team, exact: bool = False
-) -> list[Body]:
-    """Return the bodies of a robot's links, one per link.
+def link_bodies(robot: Robot, shapes: Sequence[LinkShape], team: Team) -> list[Body]:
+    """Bodies of a robot's links, one per link.
 
     Args:
         robot: The robot.
-        shapes: Collision geometry of the links; if empty, links are capsules between joints.
-        team: Team whose joints the bodies are fixed to.
-        exact: True for convex hulls, False for capsules around them.
+        shapes: Collision geometry of its links; without any, links are sticks.
+        team: The team, whose joints carry the bodies.
     """
     found: dict[tuple[str, int], list[Array]] = {}
     for shape in shapes:
@@ -71,8 +70,8 @@ def link_bodies(
     for (link, joint), parts in found.items():
         points = np.concatenate(parts)
         points = points[ConvexHull(points).vertices]
-        convex = convex_body(points) if exact else None
-        bodies.append(_placed(robot, team, link, joint, capsule_around(points), convex))
+        body = Body(link, robot.name, joint, capsule_around(points), hull=convex_body(points))
+        bodies.append(_placed(robot, team, body))
     return bodies or _default_bodies(robot, team)
 
 
@@ -81,25 +80,27 @@ def _default_bodies(robot: Robot, team: Team) -> list[Body]:
     ends = segments(robot)
     moving = [item for item in ends if item[0] > 0]
     if not any(end.any() for _, end in moving):  # A point mass.
-        tool = Capsule(np.zeros(3), np.zeros(3), 0.0)
-        return [_placed(robot, team, robot.tool_frame, ends[-1][0], tool, None)]
+        point = Capsule(np.zeros(3), np.zeros(3), 0.0)
+        return [_placed(robot, team, Body(robot.tool_frame, robot.name, ends[-1][0], point))]
     radius = default_link_radius(ends)
     return [
-        _placed(robot, team, f"link_{joint}", joint, Capsule(np.zeros(3), end, radius), None)
+        _placed(
+            robot,
+            team,
+            Body(f"link_{joint}", robot.name, joint, Capsule(np.zeros(3), end, radius)),
+        )
         for joint, end in moving
         if end.any()
     ]
 
 
-def _placed(
-    robot: Robot, team: Team, link: str, joint: int, capsule: Capsule, convex: Any
-) -> Body:
-    """Convert a body on a joint of the robot's own model to one on a joint of the team's."""
-    body = Body(f"{robot.name}/{link}", robot.name, joint, capsule, convex)
-    if joint == 0:
+def _placed(robot: Robot, team: Team, body: Body) -> Body:
+    """Return a body on a joint of the robot's own model, as one on a joint of the team's."""
+    body = replace(body, name=f"{robot.name}/{body.name}")
+    if body.joint == 0:
         return moved(body, robot.base_pose, 0)
-    number = team.model.getJointId(f"{robot.name}/{robot.model.names[joint]}")
-    return replace(body, joint=number)
+    joint = team.model.getJointId(f"{robot.name}/{robot.model.names[body.joint]}")
+    return replace(body, joint=joint)
 
 
 def moved(body: Body, pose: pin.SE3, joint: int) -> Body:
@@ -107,7 +108,11 @@ def moved(body: Body, pose: pin.SE3, joint: int) -> Body:
     capsule = Capsule(
         pose.act(body.capsule.start), pose.act(body.capsule.end), body.capsule.radius
     )
-    convex = body.convex
-    if convex is not None:
-        convex = convex_body(convex.points() @ pose.rotation.T + pose.translation)
-    return replace(body, joint=joint, capsule=capsule, convex=convex)
+    convex, hull = (_moved_convex(shape, pose) for shape in (body.convex, body.hull))
+    return replace(body, joint=joint, capsule=capsule, convex=convex, hull=hull)
+
+
+def _moved_convex(shape: Any, pose: pin.SE3) -> Any:
+    if shape is None:
+        return None
+    return convex_body(shape.points() @ pose.rotation.T + pose.translation)

@@ -71,18 +71,21 @@ class CollisionGeometry:
         first, second = self.pairs.watched[pair]
         return f"{self.bodies[first].name} - {self.bodies[second].name}"
 
-    def evaluate(self, q: Array, v: Array, reach: float = np.inf) -> Clearances:
-        """Return the clearances of all pairs closer than `reach`.
+    def evaluate(
+        self, q: Array, v: Array, reach: float = np.inf, horizon: float = 0.0
+    ) -> Clearances:
+        """Clearances of the pairs that are nearer than a reach [m].
 
         Args:
             q: Configuration, shape (nq,).
             v: Velocity, shape (n,).
-            reach: Distance beyond which a pair is omitted [m].
+            reach: Distance from which on a pair is left out [m].
+            horizon: Time in which bodies may come closer, which the reach grows by [s].
         """
         positions = np.ascontiguousarray(self.team.joints_from_configuration(q))
         watched, kinds = self.pairs.watched, self.pairs.kinds
-        motion, found, chosen, near = survey(
-            self._tree, self._capsules, watched, kinds, positions, v, reach
+        motion, found, chosen, near, reach = survey(
+            self._tree, self._capsules, watched, kinds, positions, v, reach, horizon
         )
         if len(self._convex):
             # Distances of convex bodies are those of the capsules around them so far.

@@ -4,18 +4,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import coal
 import numpy as np
+import pinocchio as pin
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.team.geometry.bodies import Body
 from noninteract_ros.team.geometry.kernels.capsules import CONVEX, PLANE, SEGMENTS, Capsules
-from noninteract_ros.team.geometry.kernels.derivatives import extremes
+from noninteract_ros.team.geometry.kernels.derivatives import sampled
 from noninteract_ros.team.geometry.kernels.kinematics import Indices, Tree
 from noninteract_ros.team.team import PRISMATIC, Team
 
-SAMPLES = 10000  # random configurations over the joints' range
-REACH = np.pi  # [m or rad] sampled range of an unlimited joint, about the initial position
-NEVER = 0.1  # [m] least distance over all samples for an excluded pair
+SAMPLES = 5000  # random configurations of the joints' whole range
+REACH = np.pi  # [m or rad] range of a joint without limits, about the start
+APART = 0.1  # [m] distance of capsules in all samples with which a pair stays apart
+MEASURED = 100  # samples in which the hulls of a pair are measured: the nearest by capsules
+TOUCH = 1e-3  # [m] distance of hulls that counts as none
 
 
 @dataclass(frozen=True)
@@ -23,10 +27,10 @@ class Pairs:
     """Pairs of bodies by index, and excluded pairs.
 
     Attributes:
-        watched: Monitored pairs, shape (m, 2).
-        kinds: Kind of each pair, as in `kernels.capsules`, shape (m,).
-        always: Pairs of one robot that overlap initially or in all samples.
-        never: Pairs of one robot that stay apart in all samples.
+        watched: Shape (m, 2).
+        kinds: Kind of each, as in `kernels`, shape (m,).
+        always: Bodies of one robot that overlap at the start or at all samples.
+        never: Bodies of one robot that do not touch at any sample within the limits of its joints.
     """
 
     watched: Indices
@@ -48,7 +52,7 @@ def find_pairs(team: Team, bodies: Sequence[Body], tree: Tree, capsules: Capsule
         if _may_collide(team, bodies[i], bodies[j])
     ]
     own = np.array([p for p in found if bodies[p[0]].owner == bodies[p[1]].owner], dtype=np.int64)
-    always, never = _sampled(team, own.reshape(-1, 2), tree, capsules)
+    always, never = _sampled(team, bodies, own.reshape(-1, 2), tree, capsules)
     left_out = {*always, *never}
     watched = np.array([p for p in found if p not in left_out], dtype=np.int64).reshape(-1, 2)
     kinds = np.array([_kind(bodies[i], bodies[j]) for i, j in watched], dtype=np.int64)
@@ -68,11 +72,21 @@ def _may_collide(team: Team, first: Body, second: Body) -> bool:
         return False
     parents = team.model.parents
     if first.owner == second.owner:
-        return parents[first.joint] != second.joint and parents[second.joint] != first.joint
-    # The first link of an arm rotates within the mounting of its base.
+        return not (_follows(parents, first, second) or _follows(parents, second, first))
+    # An arm's first link turns where its base stands on, or beside, what is around it.
     return not any(
         _rooted(team, a) and b.joint == 0 for a, b in ((first, second), (second, first))
     )
+
+
+def _follows(parents: Sequence[int], first: Body, second: Body) -> bool:
+    """Return True where the second link hangs on the first, or of meshes on the one after it.
+
+    Convex hulls of links with one between them overlap by design where the links never meet.
+    """
+    parent = parents[second.joint]
+    meshes = first.hull is not None and second.hull is not None
+    return parent == first.joint or (meshes and parents[parent] == first.joint)
 
 
 def _rooted(team: Team, body: Body) -> bool:
@@ -91,16 +105,45 @@ def joint_range(team: Team) -> tuple[Array, Array]:
 
 
 def _sampled(
-    team: Team, pairs: Indices, tree: Tree, capsules: Capsules
+    team: Team, bodies: Sequence[Body], pairs: Indices, tree: Tree, capsules: Capsules
 ) -> tuple[tuple[tuple[int, int], ...], tuple[tuple[int, int], ...]]:
-    """Return the pairs that overlap always or initially, and the pairs that never come close."""
+    """Return pairs that overlap at the start or always, and pairs that never do.
+
+    Capsules are larger than the links in them: what comes nearest by capsules is measured by the
+    hulls of the links, as far as they have any.
+    """
     if not len(pairs):
         return (), ()
     rng, (lower, upper) = np.random.default_rng(0), joint_range(team)
-    first = team.joints_from_configuration(team.q0)[None]
-    start, _ = extremes(tree, capsules, pairs, np.ascontiguousarray(first))
-    least, most = extremes(tree, capsules, pairs, rng.uniform(lower, upper, (SAMPLES, team.n)))
-    least, most = np.minimum(least, start), np.maximum(most, start)
-    always = [tuple(pair.tolist()) for pair in pairs[(most < 0.0) | (start < 0.0)]]
-    never = [tuple(pair.tolist()) for pair in pairs[least > NEVER]]
+    samples = rng.uniform(lower, upper, (SAMPLES, team.n))
+    samples[0] = team.joints_from_configuration(team.q0)
+    found = sampled(tree, capsules, pairs, samples)
+    always, never = [], []
+    for k, (i, j) in enumerate(pairs.tolist()):
+        nearest = np.argsort(found[:, k])[:MEASURED]
+        if found[:, k].max() < 0.0 or found[0, k] < 0.0:
+            always.append((i, j))
+        elif found[nearest[0], k] > APART or _hulls_stay_apart(
+            team, bodies[i], bodies[j], samples[nearest]
+        ):
+            never.append((i, j))
     return tuple(always), tuple(never)
+
+
+def _hulls_stay_apart(team: Team, first: Body, second: Body, samples: Array) -> bool:
+    """Return True where the hulls of two links are apart at all joint positions, shape (s, n)."""
+    if first.hull is None or second.hull is None:
+        return False
+    data = team.model.createData()
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    for positions in samples:
+        pin.forwardKinematics(team.model, data, team.configuration_from_joints(positions))
+        places = [data.oMi[body.joint] for body in (first, second)]
+        transforms = [coal.Transform3s(place.rotation, place.translation) for place in places]
+        result.clear()
+        distance = coal.distance(
+            first.hull, transforms[0], second.hull, transforms[1], request, result
+        )
+        if distance < TOUCH:
+            return False
+    return True

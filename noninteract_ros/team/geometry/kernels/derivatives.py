@@ -117,17 +117,26 @@ def _plane_pair(
 
 
 @compiled
-def extremes(
-    tree: Tree, capsules: Capsules, pairs: Indices, samples: Array
-) -> tuple[Array, Array]:
-    """Return smallest and largest distance of pairs of capsules over positions, shape (s, n)."""
+def sampled(tree: Tree, capsules: Capsules, pairs: Indices, samples: Array) -> Array:
+    """Distances of pairs of capsules at joint positions, shape (s, n), as shape (s, m)."""
     kinds, still = np.full(len(pairs), SEGMENTS), np.zeros(samples.shape[1])
-    least, most = np.full(len(pairs), np.inf), np.full(len(pairs), -np.inf)
+    found = np.empty((len(samples), len(pairs)))
     for k in range(len(samples)):
         motion = move(tree, samples[k], still)
-        found = distances(capsules, place(motion, capsules), pairs, kinds, np.inf)
-        least, most = np.minimum(least, found), np.maximum(most, found)
-    return least, most
+        found[k] = distances(capsules, place(motion, capsules), pairs, kinds, np.inf)
+    return found
+
+
+@inner
+def _fastest(motion: Motion, capsules: Capsules, ends: Array) -> float:
+    """Largest speed of an end of a segment [m/s]."""
+    found = 0.0
+    for b in range(len(capsules.joints)):
+        for side in range(2):
+            if capsules.joints[b] > 0:
+                w = velocity_of(motion, capsules.joints[b], at(ends[side], b), 0.0)
+                found = max(found, np.sqrt(dot(w, w)))
+    return found
 
 
 @compiled
@@ -139,10 +148,16 @@ def survey(
     positions: Array,
     v: Array,
     reach: float,
-) -> tuple[Motion, Array, Indices, Near]:
-    """Return motion, all distances, pairs within reach and their terms, except convex ones."""
+    horizon: float,
+) -> tuple[Motion, Array, Indices, Near, float]:
+    """Motion, all distances, pairs below the reach and their terms, which convex ones lack.
+
+    The reach grows by what two bodies can come closer within the horizon [s]; it is returned.
+    """
     motion = move(tree, positions, v)
     ends = place(motion, capsules)
+    if horizon > 0.0:
+        reach += 2.0 * horizon * _fastest(motion, capsules, ends)
     found = distances(capsules, ends, pairs, kinds, reach)
     chosen = np.flatnonzero(found < reach)
     near = _near(len(chosen), len(v))
@@ -152,7 +167,7 @@ def survey(
             _segment_pair(tree, motion, capsules, ends, i, j, k, near)
         elif kinds[chosen[k]] == PLANE:
             _plane_pair(tree, motion, capsules, ends, i, j, k, near)
-    return motion, found, chosen, near
+    return motion, found, chosen, near, reach
 
 
 @compiled
