@@ -42,6 +42,8 @@ LOOP_QOS = QoSProfile(depth=1000)
 SENSOR_QOS = QoSProfile(depth=1000, reliability=ReliabilityPolicy.BEST_EFFORT)
 SENSOR_TYPES = (PoseStamped, TwistStamped, WrenchStamped, Joy)
 MAX_REASON = 200  # Characters of an unexpected error.
+# Wall time: after a pause only the newest message counts.
+NEWEST_QOS = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 DIAGNOSTICS_PERIOD = 0.5
 STEADY_CLOCK = Clock(clock_type=ClockType.STEADY_TIME)
 LOG_PERIOD = 2.0

@@ -17,7 +17,7 @@ from noninteract_ros.control.energy.account import QUANTITIES, EnergyAccount, qu
 from noninteract_ros.control.telemetry.limit_activity import LimitActivity
 from noninteract_ros.control.telemetry.subtask_energies import LABELS, rows
 from noninteract_ros.control.tick import Tick
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.nodes.common.node import LOOP_QOS, NEWEST_QOS, ScenarioNode
 from noninteract_ros.nodes.messages.messages import EnergyCodec, SubtaskCodec, external_wrench
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
@@ -68,7 +68,8 @@ class Telemetry:
         self.silent_sensors: set[str] = set()
         for name in general.force_sensors:
             callback = partial(self._on_wrench, name)
-            node.subscribe(WrenchStamped, f"{name}/external_wrench", callback)
+            qos = LOOP_QOS if node.lockstep else NEWEST_QOS
+            node.subscribe(WrenchStamped, f"{name}/external_wrench", callback, qos=qos)
         self._codecs = [
             SubtaskCodec(task.name, task.elements, task.axes, task.rotates)
             for task in stack.subtasks
