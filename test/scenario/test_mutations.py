@@ -47,6 +47,7 @@ def paths(values: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
             yield from paths(value, (*path, key))
 
 
+DUMPER = getattr(yaml, "CSafeDumper", yaml.SafeDumper)  # The same, in C.
 CONTENTS = [yaml.safe_load(text) for text in TEXTS]
 PATHS = [list(paths(content)) for content in CONTENTS]
 
@@ -75,7 +76,7 @@ def changed_values(draw: Any) -> bytes:
                 block[key] = copy.deepcopy(content)
         except (LookupError, TypeError, AttributeError):
             continue  # An earlier change removed the place of this one.
-    return yaml.safe_dump(content, allow_unicode=True).encode()
+    return yaml.dump(content, Dumper=DUMPER, allow_unicode=True).encode()
 
 
 @st.composite
@@ -93,18 +94,14 @@ def changed_text(draw: Any) -> bytes:
 def check(data: bytes, file: Path) -> None:
     """Check that a file loads, or is refused in one short line that begins with its name."""
     file.write_bytes(data)
-    for read in (
-        load_scenario,
-        lambda path: rewrite(["", "--params-file", str(path)], path.parent),
-    ):
-        try:
-            read(file)
-        except ScenarioError as error:
-            text = str(error)
-            assert text.startswith(f"{file}: "), text
-            assert ": found " in text
-            assert len(text) < LONGEST
-            assert "\n" not in text
+    try:
+        load_scenario(file)
+        rewrite(["", "--params-file", str(file)], file.parent)
+    except ScenarioError as error:
+        text = str(error)
+        begins, named = text.startswith(f"{file}: "), ": found " in text
+        assert (begins, named, "\n" in text) == (True, True, False), text
+        assert len(text) < LONGEST
 
 
 QUICK = settings(
