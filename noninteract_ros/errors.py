@@ -44,6 +44,10 @@ class InputError(NoninteractError):
     """Error for a rejected message or input; the text gives the reason."""
 
 
+class StepError(NoninteractError):
+    """Error inside a control step or an integration step; the program cannot go on."""
+
+
 class RecordingError(NoninteractError):
     """Error for a recording that cannot be read or written."""
 

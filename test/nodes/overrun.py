@@ -16,7 +16,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from std_msgs.msg import String
 
-from noninteract_ros.nodes.common.node import LOOP_QOS
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
 from noninteract_ros.nodes.common.program import run_program
 from noninteract_ros.nodes.recording.raw_subscription import RawSubscription
 

@@ -20,7 +20,7 @@ from std_msgs.msg import Header, String
 from trajectory_msgs.msg import MultiDOFJointTrajectory, MultiDOFJointTrajectoryPoint
 from waiting import until
 
-from noninteract_ros.errors import InputError
+from noninteract_ros.errors import InputError, StepError
 from noninteract_ros.nodes.messages.cdr import JointStateCodec, deserialize
 from noninteract_ros.nodes.messages.messages import SubtaskCodec
 
@@ -42,6 +42,20 @@ MESSAGES: tuple[Any, ...] = (
 BYTES = [serialize_message(message) for message in MESSAGES]
 SUBTASK = SubtaskCodec("cooperative", ["cooperative"], ("x", "y"), False)
 STATES = JointStateCodec(JOINTS)
+
+
+def test_a_failing_step_ends_the_program(ros: Ros, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An error inside the control step is no rejected input: it passes the guard."""
+    node = ros.make("controller", paper())
+
+    def fail(*_: object) -> None:
+        raise ValueError("a defect")
+
+    monkeypatch.setattr(node.core, "step", fail)
+    q = node.core.team.q0
+    with pytest.raises(StepError, match="a defect"):
+        node._guard("joint_states", lambda: node._answer(0, q, np.zeros(node.core.team.n), None))
+    assert node.rejections() == {}
 
 
 def test_a_malformed_parameter_is_refused(ros: Ros) -> None:
@@ -130,7 +144,7 @@ def test_publishers_of_other_qos_are_received_or_named(ros: Ros) -> None:
     sensor.publish(WrenchStamped())
     until(lambda: received, "the wrench")
     ros.probe.create_publisher(String, "commanded", qos_profile_sensor_data)
-    until(lambda: node._mismatches, "the mismatch")
-    assert node._mismatches == {
+    until(lambda: node.mismatches, "the mismatch")
+    assert node.mismatches == {
         "commanded": "a publisher of commanded is not received: its reliability differs"
     }

@@ -22,8 +22,8 @@ from noninteract_ros.nodes.bench.programs import (
     ros,
     tick_times,
 )
-from noninteract_ros.nodes.common.node import WallRate
 from noninteract_ros.nodes.common.parameter_files import rewrite, write
+from noninteract_ros.nodes.common.wall_rate import WallRate
 from noninteract_ros.nodes.controller.controller import Controller
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import SubtaskCodec, to_wrench_stamped

@@ -10,7 +10,8 @@ from rclpy.experimental import EventsExecutor
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-from noninteract_ros.nodes.common.node import LOOP_QOS, spin
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
+from noninteract_ros.nodes.common.node import spin
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -20,7 +20,7 @@ from rclpy.task import Future
 from sensor_msgs.msg import JointState
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.nodes.common.node import LOOP_QOS
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import stamp_ns
 from noninteract_ros.nodes.recording.raw_subscription import RawSubscription

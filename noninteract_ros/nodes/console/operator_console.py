@@ -22,8 +22,10 @@ from noninteract_ros.console.frames import encode_poses
 from noninteract_ros.console.handles import drivable_subtasks
 from noninteract_ros.console.held_input import DeadMansSwitch, HeldInput
 from noninteract_ros.console.protocol import PageCommand
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, WallRate
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
+from noninteract_ros.nodes.common.node import ScenarioNode
 from noninteract_ros.nodes.common.program import run_program
+from noninteract_ros.nodes.common.wall_rate import WallRate
 from noninteract_ros.nodes.console.service_clients import ServiceClients
 from noninteract_ros.nodes.console.status import StackStatus
 from noninteract_ros.nodes.console.subscriptions import ConsoleSubscriptions

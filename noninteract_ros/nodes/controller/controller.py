@@ -15,12 +15,13 @@ from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds
 from noninteract_ros.control.controller import TeamController
 from noninteract_ros.control.references.inputs import HORIZON, SOURCES
-from noninteract_ros.errors import InputError
+from noninteract_ros.errors import InputError, StepError
 from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
 from noninteract_ros.nodes.common.lockstep import LockstepSources
-from noninteract_ros.nodes.common.node import ScenarioNode, WallRate
+from noninteract_ros.nodes.common.node import ScenarioNode
 from noninteract_ros.nodes.common.program import run_program
 from noninteract_ros.nodes.common.team_status import TeamStatus
+from noninteract_ros.nodes.common.wall_rate import WallRate
 from noninteract_ros.nodes.controller.diagnostics import ControllerDiagnostics
 from noninteract_ros.nodes.controller.parameters import AuthorityTopics, LiveParameters
 from noninteract_ros.nodes.controller.source_subscriptions import Input, subscribe_to_source
@@ -210,7 +211,11 @@ class Controller(ScenarioNode):
             self._reset_stamp = None
             self._supervision.reset()
             self.core.put_back()
-        tick = self.core.step(seconds(stamp), q, v, applied, self._telemetry.wrenches)
+        now, wrenches = seconds(stamp), self._telemetry.wrenches
+        try:
+            tick = self.core.step(now, q, v, applied, wrenches)
+        except Exception as error:  # Not an input's fault: the team brakes without a controller.
+            raise StepError(f"the control step at {now:.6f} s failed: {error!r}") from error
         self._answered = stamp
         if not self._is_expired(stamp):
             self._interface.answer(stamp, tick)

@@ -12,7 +12,8 @@ from sensor_msgs.msg import JointState
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
+from noninteract_ros.nodes.common.node import ScenarioNode
 from noninteract_ros.nodes.messages.cdr import (
     QUANTITIES,
     CdrTemplate,

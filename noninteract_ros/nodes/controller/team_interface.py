@@ -6,8 +6,9 @@ from sensor_msgs.msg import JointState
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.tick import Tick
 from noninteract_ros.nodes.common.efforts import EffortPublishers
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
 from noninteract_ros.nodes.common.loop_input import LoopInput
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.nodes.common.node import ScenarioNode
 from noninteract_ros.nodes.common.publisher_binding import PublisherWatch
 from noninteract_ros.nodes.controller.robot_states import RobotStates, StateCallback
 from noninteract_ros.nodes.messages.cdr import JointStateCodec

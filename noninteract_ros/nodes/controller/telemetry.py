@@ -17,7 +17,8 @@ from noninteract_ros.control.energy.account import QUANTITIES, EnergyAccount, qu
 from noninteract_ros.control.telemetry.limit_activity import LimitActivity
 from noninteract_ros.control.telemetry.subtask_energies import LABELS, rows
 from noninteract_ros.control.tick import Tick
-from noninteract_ros.nodes.common.node import LOOP_QOS, NEWEST_QOS, ScenarioNode
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
+from noninteract_ros.nodes.common.node import NEWEST_QOS, ScenarioNode
 from noninteract_ros.nodes.messages.messages import EnergyCodec, SubtaskCodec, external_wrench
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team

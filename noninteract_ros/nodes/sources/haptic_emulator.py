@@ -9,7 +9,7 @@ import numpy as np
 from std_msgs.msg import Float64MultiArray
 
 from noninteract_ros.clock import seconds
-from noninteract_ros.nodes.common.node import LOOP_QOS
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
 from noninteract_ros.nodes.common.program import run_program
 from noninteract_ros.nodes.messages.messages import EnergyCodec, Level
 from noninteract_ros.nodes.sources.source import SourceNode

@@ -11,7 +11,8 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.law.impedance import per_coordinate
 from noninteract_ros.errors import InputError, ScenarioError, one_of
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
+from noninteract_ros.nodes.common.node import ScenarioNode
 from noninteract_ros.nodes.messages.messages import (
     AXES,
     WORLD,

@@ -10,7 +10,9 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds, tick_stamp
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, WallRate
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
+from noninteract_ros.nodes.common.node import ScenarioNode
+from noninteract_ros.nodes.common.wall_rate import WallRate
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import Level, SubtaskCodec
 from noninteract_ros.sources.announcements import Announcer, Sampler

@@ -14,11 +14,13 @@ from std_msgs.msg import Bool, Header, String
 from std_srvs.srv import SetBool, Trigger
 
 from noninteract_ros.clock import seconds, tick_stamp
-from noninteract_ros.errors import InputError
+from noninteract_ros.errors import InputError, StepError
 from noninteract_ros.nodes.common.descriptions import LATCHED_QOS
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode, WallRate
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
+from noninteract_ros.nodes.common.node import ScenarioNode
 from noninteract_ros.nodes.common.program import run_program
 from noninteract_ros.nodes.common.team_status import FINISHED, PAUSED
+from noninteract_ros.nodes.common.wall_rate import WallRate
 from noninteract_ros.nodes.messages import messages
 from noninteract_ros.nodes.messages.messages import Level
 from noninteract_ros.nodes.team.simulated_drivers import BodyPosePublisher, SimulatedDrivers
@@ -156,7 +158,10 @@ class RobotTeam(ScenarioNode):
             torque = None
         if torque is not None:
             torque = self._drivers.applied(torque, simulation.q, simulation.v)
-        simulation.step(torque)
+        try:
+            simulation.step(torque)
+        except Exception as error:
+            raise StepError(f"the step at {simulation.now:.6f} s failed: {error!r}") from error
         self._command = self._command if not self.lockstep else None
         self._publish()
 

@@ -18,8 +18,9 @@ from std_msgs.msg import Float64MultiArray
 from noninteract_ros.arrays import Array
 from noninteract_ros.errors import InputError
 from noninteract_ros.nodes.common.efforts import EffortCodec
+from noninteract_ros.nodes.common.guarded_node import LOOP_QOS
 from noninteract_ros.nodes.common.loop_input import LoopInput
-from noninteract_ros.nodes.common.node import LOOP_QOS, ScenarioNode
+from noninteract_ros.nodes.common.node import ScenarioNode
 from noninteract_ros.nodes.common.publisher_binding import PublisherWatch
 from noninteract_ros.nodes.messages.cdr import JointStateCodec
 from noninteract_ros.nodes.messages.messages import WORLD, to_stamp
