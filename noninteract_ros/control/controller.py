@@ -10,16 +10,17 @@ import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.control.active_law import ActiveLaw
+from noninteract_ros.control.energy.command_log import with_paid
 from noninteract_ros.control.energy.external_torque import ExternalTorque
 from noninteract_ros.control.energy.gate import GATED, SIGMAS, EnergyGate, TickTerms
 from noninteract_ros.control.energy.stiffness_ramp import StiffnessRamp
 from noninteract_ros.control.energy.storage import Energy, energy
-from noninteract_ros.control.energy.tank import TankSettings
+from noninteract_ros.control.energy.tank import TankSettings, affordable
 from noninteract_ros.control.evaluator import make_evaluator
 from noninteract_ros.control.fast.compiled_layout import CompiledLayout
 from noninteract_ros.control.law.decoupling import TaskError
 from noninteract_ros.control.law.force_goal import ForceGoals
-from noninteract_ros.control.law.gated_law import decoupling, without_law
+from noninteract_ros.control.law.gated_law import decoupling, without_decoupling
 from noninteract_ros.control.law.impedance import ImpedanceSettings, stack_impedance
 from noninteract_ros.control.law.team_dynamics import Evaluation, TeamEvaluator
 from noninteract_ros.control.references.subtask_input import (
@@ -28,11 +29,12 @@ from noninteract_ros.control.references.subtask_input import (
     SubtaskInput,
 )
 from noninteract_ros.control.safety.continuity import Continuity
-from noninteract_ros.control.safety.joint_limits import JointSafety
+from noninteract_ros.control.safety.joint_limits import JointMargins
 from noninteract_ros.control.safety.settings import SafetySettings
 from noninteract_ros.control.safety.singularity import SingularityGuard, best_regularity
 from noninteract_ros.control.safety.singularity_escape import SingularityEscape
 from noninteract_ros.control.safety.stop import Stop
+from noninteract_ros.control.safety.torque_limiter import TorqueLimiter
 from noninteract_ros.control.tick import Mode, Tick
 from noninteract_ros.control.walls.wall_guard import WallGuard
 from noninteract_ros.subtasks.stack import SubtaskStack
@@ -95,7 +97,8 @@ class TeamController:
         best = best_regularity(team, stack)
         scout = SingularityEscape(team, stack, best, safety.singularity_begin)
         self._guard = SingularityGuard(team, safety, best, scout)
-        self._safety = JointSafety(team, safety)
+        self._margins, self._limiter = JointMargins(team, safety), TorqueLimiter(team, safety)
+        self._onset: Array = np.zeros(team.n)
         self._walls = WallGuard(team, stack, walls, tank.observer_gain) if walls else None
 
     @cached_property
@@ -114,9 +117,7 @@ class TeamController:
         return self._mode
 
     def set_law(self, law: str) -> None:
-        """Changes the law without a bump; the gated one begins with a fresh account."""
-        if law == GATED and self._mode.law != law:
-            self.gate.restart()
+        """Change the law without a bump; the account goes on."""
         self._change(replace(self._mode, law=law))
 
     def set_impedance(self, subtask: str, settings: ImpedanceSettings) -> None:
@@ -158,19 +159,25 @@ class TeamController:
         self._change(replace(self._mode, stopped=False))
 
     def reset(self) -> None:
-        """Forgets the past, as when the team's clock starts anew; law, gains and a stop remain."""
+        """Begin another life, as when the team's clock starts anew.
+
+        Law, gains and a stop remain.
+        """
         self._continuity.forget()
-        self._law.forget()
-        self.gate.restart()
-        self._safety.reset()
+        self._law.reset()
+        self.gate.reset()
+        self._limiter.reset()
         for item in self.inputs.values():
             item.reset()
 
     def put_back(self) -> None:
-        """The team stands at its start again, its time goes on; subtasks hold until led anew."""
+        """Begin anew where the team was put while its time goes on; subtasks hold until led.
+
+        The account goes on as well: a team that is moved by hand has earned nothing.
+        """
         self._continuity.put_back()
-        self._law.forget()  # What still fades would push the team from where it was put.
-        self.gate.restart()
+        self._law.reset()  # What still fades would push the team from where it was put.
+        self.gate.interrupt()
         self._forget_inputs()
 
     def _forget_inputs(self) -> None:
@@ -178,7 +185,7 @@ class TeamController:
             item.discard_inputs()
 
     def _change(self, mode: Mode) -> None:
-        self._law.left = self._law.left or self._mode
+        self._law.previous = self._law.previous or self._mode
         self._mode = mode
 
     def step(
@@ -204,11 +211,11 @@ class TeamController:
         elapsed = self._continuity.elapsed(now)
         step = 0.0 if restarted else elapsed
         # At the tick of a stop the inputs still count, so that the torque starts without a step.
-        left = self._law.left
-        stopped = self._mode.stopped and (left is None or left.stopped)
-        # Who looks for a way out of a singularity must not hold what lies inside it.
+        previous = self._law.previous
+        stopped = self._mode.stopped and (previous is None or previous.stopped)
+        # A team that looks for a way out of a singularity must not hold what lies inside it.
         lost = self._guard.lost
-        if restarted or stopped or lost or (left and left.stopped):
+        if restarted or stopped or lost or (previous and previous.stopped):
             self._rest_at(seen.task.x)
         if restarted:
             self._guard.reset()
@@ -216,7 +223,7 @@ class TeamController:
             self.outside.reset()
             if self._walls:
                 self._walls.reset()
-            self.gate.pause()
+            self.gate.interrupt()
         led = tuple(
             item.hold(now) if stopped else item.advance(now, step) for item in self.inputs.values()
         )
@@ -228,25 +235,27 @@ class TeamController:
             self._walls.update(step, seen, applied)
             led = self._walls.governed(led, self._mode.stopped, share == 1.0)
         changing = self._law.changing(now) or self._springs.changing
-        moment = self._moment(now, seen, led, share, step)
-        if share == 1.0:
-            self.gate.book(moment, self._mode.law, applied)
-        recovery = self._guard.recovery(q, v, share, self._mode.stopped, step)
-        acceleration, wanted = self._law.blended(
-            self._mode, self._view, seen, moment, share, recovery
+        depth = self._margins.depth(q)
+        size = np.abs(depth)
+        self._onset = size if restarted else np.minimum(self._onset, size)
+        terms = self._terms(now, seen, led, share, step, depth)
+        self.gate.book(terms, self._mode.law, applied)
+        self._deepen(depth, step)
+        guard = self._margins.at(depth, v, self._onset)
+        pull = self._guard.pull(q, share, self._mode.stopped, step)
+        asked, acceleration = self._law.command(
+            self._mode, self._view, seen, terms, pull, self._guard.damping(share)
         )
-        asked = seen.dynamics.torque(seen.state.v, wanted)
-        walled = asked
         if self._walls:
             sigma = SIGMAS.get(self._mode.law, self.gate.tank.sigma) * share
-            passive, paid = self._walls.forces(asked, 0.0 if self._mode.stopped else sigma)
-            if paid.any():
-                asked = asked + paid
-                wanted = wanted + np.linalg.solve(seen.state.M, paid)
-                acceleration = seen.dynamics.acceleration_of(seen.state.v, wanted)
-            walled = asked + passive if passive.any() else asked
-        torque, safety = self._safety.protect(q, v, walled, seen.state.g, elapsed)
-        self._law.remember(self._mode, moment, torque, acceleration, share, safety)
+            passive, paid = self._walls.forces(asked.torque, 0.0 if self._mode.stopped else sigma)
+            asked = with_paid(asked, paid)
+            guard = guard.with_torque(passive)
+        command, safety = self._limiter.limit(asked, terms, self.gate.tank, guard, elapsed)
+        if safety.shares.springs < 1.0:
+            self.gate.loosen(safety.shares.springs * self.gate.tank.nu)
+        self.gate.record(command)
+        torque = command.torque
         self._regulate(seen, wrenches, step, held=share < 1.0 or safety.acted)
         self._continuity.note(now, q)
         self.outside.note(torque)
@@ -256,15 +265,15 @@ class TeamController:
             torque,
             seen.state,
             seen.task,
-            moment.error.e_rate + moment.error.reference_velocity,
-            moment.error,
+            terms.error.e_rate + terms.error.reference_velocity,
+            terms.error,
             led,
             seen.dynamics,
             acceleration,
-            moment.added.feedback,
+            terms.added.feedback,
             share,
             relative,
-            torque - asked,
+            torque - asked.torque,
             safety,
             restarted,
             self.gate.account,
@@ -272,6 +281,18 @@ class TeamController:
             bool(restarted) or self._mode.stopped or changing,
             self._walls.report() if self._walls else None,
         )
+
+    def _deepen(self, depth: Array, step: float) -> None:
+        """Have margins that found their joint inside reach further out, as the tank pays."""
+        if not self._onset.any():
+            return
+        wanted = self._margins.deeper(self._onset, step)
+        tank = self.gate.tank
+        cost = self._margins.potential(depth, wanted) - tank.margins
+        share = affordable(tank, cost, self.gate.levels)
+        # V is convex in the onsets: a share of the change costs no more than the share.
+        self._onset = self._onset + share * (wanted - self._onset)
+        self.gate.deepen(self._margins.potential(depth, self._onset))
 
     def _regulate(self, seen: Evaluation, wrenches: Array | None, step: float, held: bool) -> None:
         """Integrates what is missing of the force goals, unless something holds the law back."""
@@ -281,26 +302,40 @@ class TeamController:
         pressing = -seen.dynamics.force_of(self.outside.torque(seen.state, wrenches))
         self._goals.advance(self._mode.impedance, pressing, step, held)
 
-    def _moment(
+    def _terms(
         self,
         now: float,
         seen: Evaluation,
         led: Sequence[SubtaskCommand],
         share: float,
         step: float,
+        depth: Array,
     ) -> TickTerms:
-        """This tick as law and account see it, with springs that wait one step further."""
+        """Return this tick as law and account use it, with a stiffness ramp one step further."""
         error = self._error(seen, led)
         tank = self.gate.tank if self._mode.law == GATED else None
         impedance = self._springs.advance(
-            self._mode.impedance, error.e, step, tank, self.gate.settings
+            self._mode.impedance, error.e, step, tank, self.gate.levels
         )
         if impedance is not self._mode.impedance:
             self._mode = replace(self._mode, impedance=impedance)
         references = [item.reference for item in led]
-        added = (decoupling if share > 0.0 else without_law)(seen.dynamics, error, impedance)
-        q, x = seen.state.q, seen.task.x
-        return TickTerms(now, q, x, references, error, seen.dynamics, impedance, added)
+        added = (decoupling if share > 0.0 else without_decoupling)(
+            seen.dynamics, error, impedance
+        )
+        return TickTerms(
+            now=now,
+            q=seen.state.q,
+            v=seen.state.v,
+            x=seen.task.x,
+            references=references,
+            error=error,
+            dynamics=seen.dynamics,
+            impedance=impedance,
+            added=added,
+            share=share,
+            margins=self._margins.potential(depth, self._onset) if depth.any() else 0.0,
+        )
 
     def energy(self, tick: Tick, external_torque: Array) -> Energy:
         """Storage functions (32) and their rates (33) of a tick.

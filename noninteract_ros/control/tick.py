@@ -8,7 +8,7 @@ from noninteract_ros.control.energy.account import EnergyAccount
 from noninteract_ros.control.law.decoupling import TaskDynamics, TaskError
 from noninteract_ros.control.law.impedance import Impedance
 from noninteract_ros.control.references.subtask_input import SubtaskCommand
-from noninteract_ros.control.safety.joint_limits import SafetyReport
+from noninteract_ros.control.safety.torque_limits import SafetyReport
 from noninteract_ros.control.walls.state import WallReport
 from noninteract_ros.subtasks.subtask import SubtaskState
 from noninteract_ros.team.team import TeamState

@@ -7,6 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from noninteract_ros.control.law.decoupling import TaskDynamics
+from noninteract_ros.control.law.impedance import Impedance
+from noninteract_ros.control.safety.torque_limiter import RATE_SHARE, rate_demand
 from noninteract_ros.control.stability.sampled_loops import MARGINAL, Loop, closed_loops
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.reporting.checks.check_report import CheckReport, Section
@@ -107,6 +110,7 @@ def check_scenario(name: str, scenario: Scenario, settings: CheckSettings) -> Ch
         _robots(team.names, team.joint_names),
         _subtasks(scenario, stack.subtasks, dynamics.inertias),
         _loops(loops),
+        *_rate_limit(scenario, stack.names, dynamics, mode.impedance),
         _clearances(scenario, team),
     )
     warnings = tuple(text for loop in loops if (text := loop.warning()))
@@ -145,6 +149,23 @@ def _loops(loops: list[Loop]) -> Section:
     )
     columns = ("loop", "damping ratios", "slowest [1/s]", "fastest [1/s]")
     return Section("loops", (*columns, "ticks per time constant", "growth per tick"), rows)
+
+
+def _rate_limit(
+    scenario: Scenario, names: Sequence[str], dynamics: TaskDynamics, impedance: Impedance
+) -> tuple[Section, ...]:
+    """Return up to which speed of its error each subtask's gains fit the torque-rate limit."""
+    limit = scenario.safety.torque_rate
+    if limit == 0.0:
+        return ()
+    eye = np.eye(len(impedance.stiffness))
+    demands = np.array([rate_demand(dynamics, impedance, rate).max() for rate in eye])
+    rows = tuple(
+        (name, float(RATE_SHARE * limit / demands[part].max()))
+        for name, part in zip(names, dynamics.slices, strict=True)
+    )
+    title = f"torque rate: {limit:g} N/s or N m/s"
+    return (Section(title, ("subtask", "speed that its gains fit [m/s; rad/s]"), rows),)
 
 
 def _clearances(scenario: Scenario, team: Team) -> Section:

@@ -150,7 +150,7 @@ class _Recording:
             v, effort = simulation.v, simulation.torque
             wrenches = simulation.external_wrenches()
             result = self._rehearsal.step()
-            self._watch.note(now / 1e9, result)
+            self._watch.record(now / 1e9, result)
             self._add(
                 "joint_states", JOINTS, now, lambda *a, t=now: self._joints.encode(t, *a),
                 q, v, effort,

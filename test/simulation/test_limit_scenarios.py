@@ -49,7 +49,7 @@ class LimitScenario:
             now = simulation.now
             self._wrenches.append(simulation.external_wrenches())
             self.ticks.append(self.rehearsal.step())
-            self.watch.note(now, self.ticks[-1])
+            self.watch.record(now, self.ticks[-1])
             conditions = self.watch.conditions(now)
             if sorted(conditions) != sorted(self.reported[-1]):
                 self.reported.append(conditions)

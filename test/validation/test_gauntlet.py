@@ -2,7 +2,6 @@
 """Gauntlet: its loops agree with the controller, its verdicts with each other."""
 
 import json
-from dataclasses import astuple
 
 import numpy as np
 import pytest
@@ -23,7 +22,7 @@ from noninteract_ros.team.models.point_mass import PointMass
 from noninteract_ros.team.robot import Robot
 from noninteract_ros.team.team import Team
 from noninteract_ros.validation.gauntlet import cases, plant
-from noninteract_ros.validation.gauntlet.accounting import ACCOUNT
+from noninteract_ros.validation.gauntlet.account import account_step, full_tank, whole
 from noninteract_ros.validation.gauntlet.arrays import SurroundingsArrays
 from noninteract_ros.validation.gauntlet.cases import Case, make_case
 from noninteract_ros.validation.gauntlet.check import counted, run_cases
@@ -40,21 +39,19 @@ CASES = (0, 3, 4, 9, 14)
 
 
 def test_the_compiled_account_is_bit_equal_to_the_controllers() -> None:
-    """Random intervals give identical accounts."""
-    settings = TankSettings()
-    compiled = ACCOUNT.settings_of(settings)
-    ours = ACCOUNT.full_tank(compiled, 0.3)
-    theirs = energy_tank.full_tank(settings, 0.3)
+    """Random intervals, booked one after the other by both, leave the same numbers."""
+    levels = energy_tank.levels(TankSettings(), 1.0)
+    ours, theirs = full_tank(levels, 0.3), energy_tank.full_tank(levels, 0.3)
     rng = np.random.default_rng(0)
     for _ in range(2000):
-        works, jump = rng.normal(0.0, 0.05, 3), rng.normal() * 0.01
-        potentials = rng.uniform(0.0, 1.0, 2)
-        values = [1e-3, *works, *potentials, jump, 1.0, rng.normal() * 20.0]
-        amounts = [float(value) for value in values]
-        ours = ACCOUNT.step(ours, ACCOUNT.interval(*amounts), compiled)
-        theirs = energy_tank.step(theirs, Interval(*amounts), settings)
-        assert tuple(ours) == astuple(theirs)
-    assert tuple(ACCOUNT.observed(ours, 0.0)) == astuple(energy_tank.observed(theirs, 0.0))
+        works = rng.normal(0.0, 0.05, 3).tolist()
+        potentials = rng.uniform(0.0, 1.0, 3).tolist()
+        led, demand = rng.normal(0.0, (0.01, 20.0)).tolist()
+        amounts = [1e-3, *works, *potentials, led, 1.0, demand]
+        ours = account_step(ours, Interval(*amounts), levels)
+        theirs = energy_tank.step(theirs, Interval(*amounts), levels)
+        assert tuple(ours) == tuple(theirs)
+    assert tuple(whole(ours, ours)) == tuple(energy_tank.whole(theirs, theirs))
 
 
 def robots_of(case: Case) -> list[Robot]:
@@ -116,7 +113,7 @@ def test_torques_and_account_agree_with_the_controller(
     rows = trace(case, law, settings, 600, 1)
     controller = controller_of(case, law)
     controller.gate.settings = tank
-    controller.gate.restart()
+    controller.gate.reset()
     n, m = case.team.n, case.start.shape[1]
     torques = rows[:, TRACED + 2 * m :]
     draws = np.random.RandomState(index)
@@ -129,7 +126,8 @@ def test_torques_and_account_agree_with_the_controller(
         tick = controller.step(1e-3 * k, q.copy(), v.copy(), applied)
         np.testing.assert_allclose(tick.torque, torques[k + delay], atol=1e-9 * size)
         account = controller.gate.tank
-        found = account.sigma, account.grip, account.level, account.reserve, account.lost
+        sigma = controller.gate.account.sigma
+        found = sigma, account.nu, account.level, account.reserve, account.lost
         np.testing.assert_allclose(row[1:6], found, atol=1e-9)
     if law == "energy_gated":
         assert rows[:, 1].min() < 1.0 or rows[:, 3].min() > 0.01

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a controller knows of the energy at the port where its team is touched."""
+"""State of the energy account at the port where a team is touched."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ import numpy as np
 
 from noninteract_ros.control.energy.tank import EnergyTank
 
-# What is told of an account, on the topic `energy`, in this order.
+# Published of an account on the topic `energy`, in this order.
 QUANTITIES = (
     "storage",
     "supplied",
@@ -17,7 +17,7 @@ QUANTITIES = (
     "owed",
     "reserve",
     "sigma",
-    "grip",
+    "nu",
     "residual",
     "received",
     "measured",
@@ -36,18 +36,18 @@ class EnergyAccount:
 
     Attributes:
         tank: Energies and gates.
-        kinetic: T = e_rate' Lambda e_rate / 2 [J].
-        dissipated: nu e_rate' D e_rate [W].
+        kinetic: T = s' M s / 2, s the velocity beyond that of the references [J].
+        dissipated: Power that the dampers in force absorb [W].
         demand: P, power that complete decoupling would inject [W].
-        received: Work of the surroundings since the account began: what T grew by less the work
+        received: Work of the environment since the account began: what T grew by less the work
             of the torques that were applied, both measured [J].
         start: W when the account began [J].
         turnover: Sum of the sizes of everything that was added up [J].
         number: Number of the account; all sums begin anew with it.
-        gated: Whether the law in force has gates.
+        fixed: sigma of a law without gates; None where the gates are in force.
     """
 
-    tank: EnergyTank[float]
+    tank: EnergyTank
     kinetic: float
     dissipated: float
     demand: float
@@ -55,33 +55,44 @@ class EnergyAccount:
     start: float
     turnover: float
     number: int
-    gated: bool
+    fixed: float | None
+
+    @property
+    def gated(self) -> bool:
+        """True where the law in force has gates."""
+        return self.fixed is None
+
+    @property
+    def sigma(self) -> float:
+        """Gate of the decoupling in force, 0 to 1."""
+        return self.tank.sigma if self.fixed is None else self.fixed
 
     @property
     def closing(self) -> bool:
-        """Whether a gate leaves less than the whole law in force."""
-        return self.gated and (self.tank.sigma < 1.0 or self.tank.grip < 1.0)
+        """True where a gate leaves less than the whole law in force."""
+        tank = self.tank
+        return self.gated and (tank.sigma < 1.0 or tank.nu < 1.0 or tank.damping < 1.0)
 
     @property
     def storage(self) -> float:
-        """T + nu U [J]."""
-        return self.kinetic + self.tank.grip * self.tank.potential
+        """T + nu U + V [J]."""
+        return self.kinetic + self.tank.nu * self.tank.potential + self.tank.margins
 
     @property
     def whole(self) -> float:
-        """W, the storage function of the port: T + nu U + R + E [J]."""
+        """W, the storage function of the port: T + nu U + V + R + E [J]."""
         return self.storage + self.tank.reserve + self.tank.level
 
     @property
     def residual(self) -> float:
-        """What W grew by beyond all that came in, -L and never positive but for rounding [J]."""
+        """Growth of W beyond all that came in, -L and never positive but for rounding [J]."""
         tank = self.tank
         came_in = self.received + tank.brought + tank.granted + tank.refilled
         return self.whole - self.start - came_in
 
     @property
     def imbalance(self) -> float:
-        """What the residual is beyond the loss that was booked, zero but for rounding [J]."""
+        """Residual beyond the loss that was booked, zero but for rounding [J]."""
         return self.residual + self.tank.lost
 
     @property
@@ -91,12 +102,12 @@ class EnergyAccount:
 
     @property
     def sound(self) -> bool:
-        """Whether the imbalance is what rounding can make; not so, if it is no number."""
+        """True where rounding explains the imbalance; False where it is no number."""
         return abs(self.imbalance) <= self.bound
 
 
 def quantities(account: EnergyAccount, supplied: float, measured: float) -> tuple[float, ...]:
-    """The numbers of `QUANTITIES`, in their order.
+    """Return the numbers of `QUANTITIES`, in their order.
 
     Args:
         account: The account at a tick.
@@ -112,8 +123,8 @@ def quantities(account: EnergyAccount, supplied: float, measured: float) -> tupl
         tank.level,
         tank.owed,
         tank.reserve,
-        tank.sigma,
-        tank.grip,
+        account.sigma,
+        tank.nu,
         account.residual,
         account.received,
         measured,

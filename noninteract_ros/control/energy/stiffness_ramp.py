@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.control.energy.tank import EnergyTank, TankSettings, affordable
+from noninteract_ros.control.energy.tank import EnergyTank, TankLevels, affordable
 from noninteract_ros.control.law.impedance import Impedance
 
 
@@ -51,8 +51,8 @@ class StiffnessRamp:
         impedance: Impedance,
         e: Array,
         step: float,
-        tank: EnergyTank[float] | None,
-        settings: TankSettings,
+        tank: EnergyTank | None,
+        settings: TankLevels,
     ) -> Impedance:
         """The impedance one tick later.
 
@@ -69,7 +69,7 @@ class StiffnessRamp:
         self._waits = False
         if tank is not None:
             cost = _stored(self._at(progress), e) - _stored(impedance, e)
-            share = affordable(tank, tank.grip * cost, settings)
+            share = affordable(tank, tank.nu * cost, settings)
             self._waits = share < 1.0
             progress = self._progress + share * (progress - self._progress)
         self._progress = progress

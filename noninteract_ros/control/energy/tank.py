@@ -1,21 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The energy account of the gated law: a tank for the decoupling, a reserve for the impedance.
+"""The energy account of a team: a tank for the decoupling, a reserve for everything else.
 
 Symbols and proofs are those of docs/derivations.md. Nothing here knows a robot: work that was
-measured over an interval goes in, the two gates that scale the torque come out. All amounts may be
-arrays over many cases instead of numbers.
+measured over an interval goes in, the gates that scale the torque come out. All functions are pure
+and take numbers only, so that numba compiles them as they stand; the gauntlet does.
 """
 
-from dataclasses import dataclass, replace
-from typing import Generic, TypeVar
+from dataclasses import dataclass
+from typing import NamedTuple
 
-import numpy as np
-
-from noninteract_ros.arrays import Array
 from noninteract_ros.errors import ScenarioError
 from noninteract_ros.schema import key
 
-Amount = TypeVar("Amount", float, Array)
+DAMPER_TRIAL = 0.05  # share of the dampers that is judged where the gate leaves less of them
 
 
 @dataclass(frozen=True)
@@ -66,7 +63,7 @@ class TankSettings:
     )
 
     def check(self) -> None:
-        """Refuses levels that could never be reached or that would let sigma breathe.
+        """Refuse levels that could never be reached or that would let sigma breathe.
 
         Raises:
             ScenarioError: Not initial <= capacity, full_gate < reopening_level <= capacity.
@@ -79,19 +76,40 @@ class TankSettings:
             raise ScenarioError("tank.reopening_level", self.reopening_level, allowed)
 
 
-@dataclass(frozen=True, slots=True)
-class EnergyTank(Generic[Amount]):
-    """What the account remembers. Storage of the port is T + grip U + reserve + level.
+class TankLevels(NamedTuple):
+    """The settings of an account as numbers; see `TankSettings`.
+
+    Attributes:
+        credit: kappa, energy granted per energy that references bring.
+    """
+
+    capacity: float
+    initial: float
+    reserve: float
+    refill_fraction: float
+    full_gate: float
+    look_ahead: float
+    reopening_level: float
+    opening_rate: float
+    closing_rate: float
+    credit: float
+
+
+class EnergyTank(NamedTuple):
+    """State of the account. Storage of the port is T + nu U + V + reserve + level.
 
     Attributes:
         level: E, energy for the decoupling [J]; at most the capacity plus what was granted to
             references still under way.
-        reserve: R, energy for the impedance's own sampling errors [J].
+        reserve: R, energy for all other forces of the controller [J].
         sigma: Gate of the decoupling, 0 to 1.
-        grip: Gate nu of the impedance, 0 to 1; exactly 1 while half of the reserve is there.
+        nu: Gate of the springs, 0 to 1; exactly 1 while half of the reserve is there.
+        damping: Gate of the dampers, 0 to 1; exactly 1 unless dampers that act late feed motions.
+        dampers: What the dampers may still feed before their gate closes [J].
         owed: Energy that must come in before sigma may rise [J]; what the decoupling returns of
             the energy that it was lent does not count.
         potential: U at the last step [J].
+        margins: V at the last step, the potential of the joint limits' margins [J].
         lost: Energy withheld or spilt since the start [J]; never falls.
         granted: Credit given for references since the start [J].
         brought: Energy that references brought since the start, net [J].
@@ -99,189 +117,241 @@ class EnergyTank(Generic[Amount]):
         refilled: Energy that an operator granted since the start [J].
     """
 
-    level: Amount
-    reserve: Amount
-    sigma: Amount
-    grip: Amount
-    owed: Amount
-    potential: Amount
-    lost: Amount
-    granted: Amount
-    brought: Amount
-    peak: Amount
-    refilled: Amount
+    level: float
+    reserve: float
+    sigma: float
+    nu: float
+    damping: float
+    dampers: float
+    owed: float
+    potential: float
+    margins: float
+    lost: float
+    granted: float
+    brought: float
+    peak: float
+    refilled: float
 
 
-@dataclass(frozen=True, slots=True)
-class Interval(Generic[Amount]):
-    """What was measured since the last step.
+class Interval(NamedTuple):
+    """Measurements of the time since the last step.
 
     Attributes:
         step: Length [s].
-        impedance_work: Work of the impedance force that was applied, grip included [J].
-        decoupling_work: Work of the decoupling force that was applied, sigma included [J].
-        input_work: Work of the sources' force inputs [J].
-        arrived: U where the motion arrived, the references followed as they were foretold [J].
+        decoupling_work: Work of all forces that the tank pays, as they were applied [J].
+        other_work: Work of all other forces, less what it lifted of the robots' weight [J].
+        damped: Energy that the dampers would have absorbed with their gate open [J].
+        arrived: U where the motion arrived, the references followed as predicted [J].
         potential: U now, after the references moved to where they are [J].
-        kinetic_jump: What the same move changed in the kinetic energy of the error [J].
+        margins: V now [J].
+        led: Energy that references and force inputs brought beyond the change of nu U [J].
         storage: V_s, sum of the subtasks' storage functions (32) now [J].
         demand: Power that complete decoupling would inject now [W].
     """
 
-    step: Amount
-    impedance_work: Amount
-    decoupling_work: Amount
-    input_work: Amount
-    arrived: Amount
-    potential: Amount
-    kinetic_jump: Amount
-    storage: Amount
-    demand: Amount
+    step: float
+    decoupling_work: float
+    other_work: float
+    damped: float
+    arrived: float
+    potential: float
+    margins: float
+    led: float
+    storage: float
+    demand: float
 
 
-def full_tank(settings: TankSettings, potential: Amount) -> EnergyTank[Amount]:
-    """A fresh account, with the potential U [J] of the errors that it begins with."""
-    none = 0.0 * potential
-    return EnergyTank(
-        none + settings.initial,
-        none + settings.reserve,
-        none + 1.0,
-        none + 1.0,
-        none,
-        potential,
-        none,
-        none,
-        none,
-        none,
-        none,
+def levels(settings: TankSettings, credit: float, refills: bool = True) -> TankLevels:
+    """Return the settings as numbers.
+
+    Args:
+        settings: The settings.
+        credit: kappa.
+        refills: False where what is absorbed is not to refill the tank.
+    """
+    return TankLevels(
+        capacity=float(settings.capacity),
+        initial=float(settings.initial),
+        reserve=float(settings.reserve),
+        refill_fraction=float(settings.refill_fraction) if refills else 0.0,
+        full_gate=float(settings.full_gate),
+        look_ahead=float(settings.look_ahead),
+        reopening_level=float(settings.reopening_level),
+        opening_rate=float(settings.opening_rate),
+        closing_rate=float(settings.closing_rate),
+        credit=float(credit),
     )
 
 
-def refill(tank: EnergyTank[Amount], settings: TankSettings) -> EnergyTank[Amount]:
-    """Fills tank and reserve on purpose; nothing is owed, the gates open at their own rates."""
-    level = _greater(tank.level, settings.capacity)
-    reserve = _greater(tank.reserve, settings.reserve)
+def full_tank(limits: TankLevels, potential: float) -> EnergyTank:
+    """Return a fresh account, with the potential U [J] of the errors that it begins with."""
+    return EnergyTank(
+        level=limits.initial,
+        reserve=limits.reserve,
+        sigma=1.0,
+        nu=1.0,
+        damping=1.0,
+        dampers=limits.reserve,
+        owed=0.0,
+        potential=potential,
+        margins=0.0,
+        lost=0.0,
+        granted=0.0,
+        brought=0.0,
+        peak=0.0,
+        refilled=0.0,
+    )
+
+
+def carry(tank: EnergyTank, potential: float, margins: float) -> EnergyTank:
+    """Return the same account at the start of new sums, where a state does not follow.
+
+    Energies and gates go on, and so does what references must bring before they earn credit.
+
+    Args:
+        tank: The account.
+        potential: U of the errors that the new sums begin with [J].
+        margins: V there [J].
+    """
+    return EnergyTank(
+        level=tank.level,
+        reserve=tank.reserve,
+        sigma=tank.sigma,
+        nu=tank.nu,
+        damping=tank.damping,
+        dampers=tank.dampers,
+        owed=tank.owed,
+        potential=potential,
+        margins=margins,
+        lost=0.0,
+        granted=0.0,
+        brought=0.0,
+        peak=tank.peak - tank.brought,
+        refilled=0.0,
+    )
+
+
+def refill(tank: EnergyTank, limits: TankLevels) -> EnergyTank:
+    """Fill tank and reserve on purpose; nothing is owed, sigma opens at its own rate."""
+    level = max(tank.level, limits.capacity)
+    reserve = max(tank.reserve, limits.reserve)
     refilled = tank.refilled + (level - tank.level) + (reserve - tank.reserve)
-    return replace(tank, level=level, reserve=reserve, owed=0.0 * level, refilled=refilled)
+    return tank._replace(
+        level=level, reserve=reserve, dampers=limits.reserve, owed=0.0, refilled=refilled
+    )
 
 
-def revalue(tank: EnergyTank[Amount], potential: Amount) -> EnergyTank[Amount]:
-    """Takes what other gains change in U from the tank, or gives it back to the reserve.
+def revalue(tank: EnergyTank, potential: float) -> EnergyTank:
+    """Take what other gains change in U from the tank, or give it back to the reserve.
 
     Args:
         tank: The account.
         potential: U of the same error under the new gains [J].
     """
-    cost = tank.grip * (potential - tank.potential)
-    paid = _greater(cost, 0.0)
-    return replace(
-        tank,
-        level=tank.level - paid,
-        reserve=tank.reserve + (paid - cost),
-        potential=potential,
-    )
+    cost = tank.nu * (potential - tank.potential)
+    paid = max(cost, 0.0)
+    level, reserve = tank.level - paid, tank.reserve + (paid - cost)
+    return tank._replace(level=level, reserve=reserve, potential=potential)
 
 
-def affordable(tank: EnergyTank[float], cost: float, settings: TankSettings) -> float:
-    """Share of a change with a cost [J], 0 to 1, that the tank can pay and still be open."""
-    spare = tank.level - settings.full_gate
+def deepen(tank: EnergyTank, margins: float) -> EnergyTank:
+    """Pay for margins of joint limits that reach further out, with V [J] at the same state."""
+    return tank._replace(level=tank.level - (margins - tank.margins), margins=margins)
+
+
+def loosen(tank: EnergyTank, nu: float) -> EnergyTank:
+    """Leave a smaller share of the springs in force; what they give up goes to the reserve."""
+    return tank._replace(nu=nu, reserve=tank.reserve + (tank.nu - nu) * tank.potential)
+
+
+def affordable(tank: EnergyTank, cost: float, limits: TankLevels) -> float:
+    """Return the share of a change with a cost [J] that leaves the gate open, 0 to 1."""
+    spare = tank.level - limits.full_gate
     return 1.0 if cost <= 0.0 else min(1.0, max(0.0, spare) / cost)
 
 
-def step(
-    tank: EnergyTank[Amount], interval: Interval[Amount], settings: TankSettings
-) -> EnergyTank[Amount]:
-    """Books one interval and sets both gates for the next one, (C2) and (C3)."""
-    tank = _credit(_book(tank, interval, settings), interval, settings)
-    purse = tank.reserve + tank.grip * interval.potential
-    grip = _unit(purse / (interval.potential + 0.5 * settings.reserve))
-    sigma, owed = _gate(tank, interval, settings)
-    return replace(
-        tank,
-        grip=grip,
-        reserve=purse - grip * interval.potential,  # A spring that yields gives back its energy.
-        sigma=sigma,
-        owed=owed,
-        potential=interval.potential,
-    )
-
-
-def observed(tank: EnergyTank[Amount], sigma: float) -> EnergyTank[Amount]:
-    """The account of a law that has no gates: sigma as it is there, and no yielding."""
-    purse = tank.reserve + tank.grip * tank.potential
-    whole = 0.0 * purse + 1.0
-    return replace(tank, grip=whole, reserve=purse - tank.potential, sigma=sigma * whole)
-
-
-def _book(
-    tank: EnergyTank[Amount], interval: Interval[Amount], settings: TankSettings
-) -> EnergyTank[Amount]:
-    """Work of both forces; a reserve that is full passes a share on to the tank."""
-    absorbed = -interval.impedance_work - tank.grip * (interval.arrived - tank.potential)
+def step(tank: EnergyTank, interval: Interval, limits: TankLevels) -> EnergyTank:
+    """Book one interval and set all gates for the next one, (C2) and (C3)."""
+    # Works: what springs and margins store beyond the work on them is none of the reserve's.
+    absorbed = -interval.other_work - tank.nu * (interval.arrived - tank.potential)
+    absorbed -= interval.margins - tank.margins
     reserve = tank.reserve + absorbed
-    surplus = _greater(reserve - settings.reserve, 0.0)
-    share = settings.refill_fraction * surplus
+    # What springs have given up waits in the reserve until they are back.
+    full = limits.reserve + (1.0 - tank.nu) * interval.arrived
+    surplus = max(reserve - full, 0.0)
+    share = limits.refill_fraction * surplus
     offered = tank.level - interval.decoupling_work + share
     # Credit lapses as the motion that it was granted for decays.
-    level = _less(offered, settings.capacity + 2.0 * settings.reference_credit * interval.storage)
-    lost = (surplus - share) + (offered - level)
-    return replace(
-        tank,
-        reserve=reserve - surplus,
+    level = min(offered, limits.capacity + 2.0 * limits.credit * interval.storage)
+    lost = tank.lost + ((surplus - share) + (offered - level))
+    # References: never twice for the same.
+    moved = tank.nu * (interval.potential - interval.arrived) + interval.led
+    brought = tank.brought + moved
+    peak = max(tank.peak, brought)
+    credit = limits.credit * (peak - tank.peak)
+    level += credit
+    owed = max(max(tank.owed - share, 0.0) - credit, 0.0)
+    # Gates.
+    purse = (reserve - surplus) + tank.nu * interval.potential
+    nu = _unit(purse / (interval.potential + 0.5 * limits.reserve))
+    fed = tank.dampers + max(tank.damping, DAMPER_TRIAL) * interval.damped
+    dampers = min(fed, limits.reserve)
+    needed = limits.full_gate + limits.look_ahead * abs(interval.demand)
+    # What an unstable motion returns on its way back must not reopen the gate.
+    short = level < limits.reopening_level
+    rise = 0.0 if short or owed > 0.0 else limits.opening_rate * interval.step
+    lowest = tank.sigma - limits.closing_rate * interval.step
+    sigma = min(max(_unit(level / needed), lowest), tank.sigma + rise)
+    if short and sigma < tank.sigma:
+        owed = max(owed, limits.reopening_level - limits.full_gate)
+    return EnergyTank(
         level=level,
-        owed=_greater(tank.owed - share, 0.0),
-        lost=tank.lost + lost,
-    )
-
-
-def _credit(
-    tank: EnergyTank[Amount], interval: Interval[Amount], settings: TankSettings
-) -> EnergyTank[Amount]:
-    """Grants energy for what references have brought, never twice for the same."""
-    moved = tank.grip * (interval.potential - interval.arrived) + interval.kinetic_jump
-    brought = tank.brought + moved + interval.input_work
-    peak = _greater(tank.peak, brought)
-    credit = settings.reference_credit * (peak - tank.peak)
-    return replace(
-        tank,
-        level=tank.level + credit,
-        owed=_greater(tank.owed - credit, 0.0),
+        reserve=purse - nu * interval.potential,  # A spring that yields gives back its energy.
+        sigma=sigma,
+        nu=nu,
+        damping=_unit(dampers / (0.5 * limits.reserve)),
+        dampers=dampers,
+        owed=owed,
+        potential=interval.potential,
+        margins=interval.margins,
+        lost=lost,
         granted=tank.granted + credit,
         brought=brought,
         peak=peak,
+        refilled=tank.refilled,
     )
 
 
-def _gate(
-    tank: EnergyTank[Amount], interval: Interval[Amount], settings: TankSettings
-) -> tuple[Amount, Amount]:
-    """Sigma for the next tick, and what must come in before it may rise."""
-    needed = settings.full_gate + settings.look_ahead * abs(interval.demand)
-    wanted = _unit(tank.level / needed)
-    # What an unstable motion returns on its way back must not reopen the gate.
-    short = tank.level < settings.reopening_level
-    shut = short | (tank.owed > 0.0)
-    highest = tank.sigma + settings.opening_rate * interval.step * (1.0 - shut)
-    lowest = tank.sigma - settings.closing_rate * interval.step
-    sigma = _less(_greater(wanted, lowest), highest)
-    closes = short & (sigma < tank.sigma)
-    quantum = settings.reopening_level - settings.full_gate
-    return sigma, _greater(tank.owed, quantum * closes)
+def whole(tank: EnergyTank, before: EnergyTank) -> EnergyTank:
+    """Return the account of a law without gates: springs and dampers whole, sigma as it was.
+
+    Springs that effort limits had loosened come back as far as the reserve pays.
+
+    Args:
+        tank: The account.
+        before: The same a step ago.
+    """
+    purse = tank.reserve + tank.nu * tank.potential
+    nu = 1.0
+    if before.nu < 1.0 and purse < tank.potential:
+        nu = max(purse, 0.0) / tank.potential
+    return EnergyTank(
+        level=tank.level,
+        reserve=purse - nu * tank.potential,
+        sigma=tank.sigma,
+        nu=nu,
+        damping=1.0,
+        dampers=tank.dampers,
+        owed=tank.owed,
+        potential=tank.potential,
+        margins=tank.margins,
+        lost=tank.lost,
+        granted=tank.granted,
+        brought=tank.brought,
+        peak=tank.peak,
+        refilled=tank.refilled,
+    )
 
 
-def _unit(value: Amount) -> Amount:
-    return _less(_greater(value, 0.0), 1.0)
-
-
-def _less(first: Amount, second: Amount | float) -> Amount:
-    """The smaller one, element by element; for numbers without the detour over arrays."""
-    if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
-        return np.minimum(first, second)
-    return min(first, second)
-
-
-def _greater(first: Amount, second: Amount | float) -> Amount:
-    """The greater one; see `_less`."""
-    if isinstance(first, np.ndarray) or isinstance(second, np.ndarray):
-        return np.maximum(first, second)
-    return max(first, second)
+def _unit(value: float) -> float:
+    return min(max(value, 0.0), 1.0)

@@ -84,6 +84,7 @@ class RobotwiseDynamics(TaskDynamics):
             ],
             "_shared": (coordinates.plan, blocks, mixers),
             "_inverse": (coordinates.plan, blocks, mixers, G_inverse),
+            "_transposed": [],
         }
         for name, value in values.items():
             object.__setattr__(self, name, value)
@@ -94,6 +95,7 @@ class RobotwiseDynamics(TaskDynamics):
     _desired_parts: list[tuple[slice, Array]]
     _shared: tuple[Plan, Array, Array]
     _inverse: tuple[Plan, Array, Array, Array]
+    _transposed: list[Array]
 
     def __getattr__(self, name: str) -> object:
         """Compute the matrices of the team at the first access to one of them."""
@@ -171,6 +173,13 @@ class RobotwiseDynamics(TaskDynamics):
         """Return S' tau = A^-T T^-T tau, shape (n,)."""
         return task.force_of(*self._inverse, torque)
 
+    def torque_of(self, force: Array) -> Array:
+        """J' f, shape (n,); only near limits and singularities, so that J may be formed."""
+        if not self._transposed:
+            columns = [self.velocity(column) for column in np.eye(len(self.g))]
+            self._transposed.append(np.array(columns))
+        return self._transposed[0] @ force
+
     def multiply_by_inertia(self, acceleration: Array) -> Array:
         """Return Lambda a = A^-T L A^-1 a, shape (n,)."""
         return task.multiply_by_inertia(*self._inverse, acceleration)
@@ -195,4 +204,8 @@ class RobotwiseDynamics(TaskDynamics):
 
     def decoupled_external_force(self, external_torque: Array) -> Array:
         """Return M_s J M^-1 tau_e, shape (n,)."""
-        return self.multiply_by_inertias(task.acceleration_under(*self._shared, external_torque))
+        return self.multiply_by_inertias(self.acceleration_under(external_torque))
+
+    def acceleration_under(self, torque: Array) -> Array:
+        """Return J M^-1 tau, shape (n,)."""
+        return task.acceleration_under(*self._shared, torque)

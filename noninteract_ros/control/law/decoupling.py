@@ -92,6 +92,10 @@ class TaskDynamics:
         """S' tau, shape (n,) [N]: the forces on the subtasks that a joint torque amounts to."""
         return self.S.T @ torque
 
+    def torque_of(self, force: Array) -> Array:
+        """J' f, shape (n,) [N or N m]: the joint torque that forces on the subtasks amount to."""
+        return self.J.T @ force
+
     def multiply_by_inertia(self, acceleration: Array) -> Array:
         """Lambda a, shape (n,)."""
         return self.inertia @ acceleration
@@ -116,7 +120,11 @@ class TaskDynamics:
 
     def decoupled_external_force(self, external_torque: Array) -> Array:
         """tau~e = Gamma^-1 tau_e = M_s J M^-1 tau_e, shape (n,) [N]."""
-        return self.multiply_by_inertias(self.J @ np.linalg.solve(self.M, external_torque))
+        return self.multiply_by_inertias(self.acceleration_under(external_torque))
+
+    def acceleration_under(self, torque: Array) -> Array:
+        """J M^-1 tau, shape (n,): the task acceleration that a joint torque adds."""
+        return self.J @ np.linalg.solve(self.M, torque)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,10 +12,10 @@ class Fade:
     def __init__(self) -> None:
         self._duration = 1.0
         self._difference: Array = np.zeros(0)
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """Ends at once."""
+    def reset(self) -> None:
+        """End at once."""
         self._start = -np.inf
 
     def active(self, now: float) -> bool:

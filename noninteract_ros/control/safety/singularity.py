@@ -100,26 +100,28 @@ class SingularityGuard:
         progress = max(0.0, (relative - end) / (begin - end))
         return float(progress**2 * (3.0 - 2.0 * progress))
 
-    def recovery(self, q: Array, v: Array, share: float, stopped: bool, step: float) -> Array:
-        """Joint acceleration of the recovery, shape (n,); to be called at each tick.
+    def pull(self, q: Array, share: float, stopped: bool, step: float) -> Array | None:
+        """Return the joint acceleration that leads out, shape (n,), or None; once at each tick.
 
         Args:
             q: Configuration, shape (nq,).
-            v: Velocity, shape (n,).
-            share: Share of the law.
-            stopped: Whether the team is to come to rest where it is.
+            share: Share of the decoupling.
+            stopped: True where the team is to come to rest where it is.
             step: Time since the last tick [s].
         """
         if share == 1.0:
             self._regular, self._pull = q, 1.0
-            return np.zeros_like(v)
-        damping = -self._settings.recovery_damping * v
+            return None
         goal = self._regular
         if goal is None:
             if self._scout is None:
-                return damping
+                return None
             goal = self._scout.goal(q)
         change = step / RAMP
         self._pull = max(0.0, self._pull - change) if stopped else min(1.0, self._pull + change)
         way = self._team.difference(q, goal)
-        return self._settings.recovery_stiffness * self._pull * way + damping
+        return (1.0 - share) * self._settings.recovery_stiffness * self._pull * way
+
+    def damping(self, share: float) -> float:
+        """Return the rate [1/s] at which all joints are damped beside the law."""
+        return (1.0 - share) * self._settings.recovery_damping

@@ -29,19 +29,19 @@ class Stop:
     def __init__(self, rate: float, max_jerk: Array) -> None:
         self._slowest, self._max_jerk = rate, max_jerk
         self._rate = rate
-        self.forget()
+        self.reset()
 
     @property
     def ramp_time(self) -> float:
-        """How long the damping of this stop rises [s]."""
+        """Time in which the damping of this stop rises [s]."""
         return RAMP / self._rate
 
-    def forget(self) -> None:
-        """A stop of before: its damping is in full force."""
+    def reset(self) -> None:
+        """Have the damping in full force, as of a stop that began long ago."""
         self._began = -np.inf
 
     def begin(self, now: float, velocity: Array) -> None:
-        """A stop begins at a time [s].
+        """Begin a stop at a time [s].
 
         Args:
             now: The time [s].
@@ -54,5 +54,5 @@ class Stop:
         self._rate = float(np.clip(fitting, self._slowest, quickest))
 
     def damping(self, now: float) -> float:
-        """d [1/s] at a time [s]."""
+        """Return d [1/s] at a time [s]."""
         return self._rate * min(1.0, (now - self._began) / self.ramp_time)

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What people are told of singularities and joint limits, so that it can be read."""
+"""Conditions of singularities, limits and gates, in words and numbers for diagnostics."""
 
 from collections.abc import Iterator, Sequence
 
 from noninteract_ros.control.energy.account import EnergyAccount
 from noninteract_ros.control.tick import Tick
 
-LINGER = 1.0  # [s] for which a condition is told after it last held, so that it does not flicker
+LINGER = 1.0  # [s] for which a condition is reported after it last held, against flicker
+RELEASED = 0.1  # nu below which springs hold next to nothing
 
 
 class LimitActivity:
-    """Collects over many ticks what `Tick` says of each.
+    """Collects conditions over many ticks.
 
     Args:
         joint_names: Names of the team's joints.
@@ -28,11 +29,11 @@ class LimitActivity:
         self._lowest: dict[str, float] = {}
 
     def reset(self) -> None:
-        """Starts anew, as the team's clock does."""
+        """Drop all conditions, as when the team's clock starts anew."""
         self._last.clear()
 
-    def note(self, now: float, tick: Tick) -> None:
-        """Takes one tick, at the team's time [s]."""
+    def record(self, now: float, tick: Tick) -> None:
+        """Add one tick, at the team's time [s]."""
         self.interventions += tick.intervened
         self.transitions += tick.in_transition
         for name, share in self._shares(tick):
@@ -41,11 +42,11 @@ class LimitActivity:
             self._last |= dict.fromkeys(self._texts(tick), now)
 
     def conditions(self, now: float) -> list[str]:
-        """What holds at the team's time [s], or did until lately, in words."""
+        """Return what holds at the team's time [s], or did until lately, in words."""
         return [text for text, last in list(self._last.items()) if now - last <= LINGER]
 
     def values(self) -> dict[str, float]:
-        """Lowest shares and regularity since the last call, and the number of interventions."""
+        """Return lowest shares and regularity since the last call, and the interventions."""
         values, self._lowest = self._lowest, {}
         return values | {"interventions": self.interventions}
 
@@ -58,8 +59,9 @@ class LimitActivity:
         if tick.walls is not None and tick.walls.nearest:
             yield "clearance, lowest [m]", tick.walls.least
         if tick.account.gated:
-            yield "sigma, lowest", tick.account.tank.sigma
-            yield "grip, lowest", tick.account.tank.grip
+            yield "sigma, lowest", tick.account.sigma
+            yield "nu, lowest", tick.account.tank.nu
+            yield "damping, lowest", tick.account.tank.damping
 
     def _texts(self, tick: Tick) -> Iterator[str]:
         safety = tick.safety
@@ -69,9 +71,9 @@ class LimitActivity:
             yield "near a singularity: recovering"
         if safety.effort_share < 1.0 or safety.clipped:
             yield "at effort limits"
-        if safety.rate_share < 1.0:
+        if safety.rate_share < 1.0 or safety.rate_fit < 1.0:
             yield "at the torque-rate limit"
-        yield from _gates(tick.account)
+        yield from _gates(tick.account, safety.shares.springs)
         for joint in safety.repelled:
             yield f"{self._joints[joint]} at its position limit"
         if tick.walls is not None and tick.walls.active:
@@ -80,9 +82,17 @@ class LimitActivity:
             yield f"{self._joints[joint]} too fast"
 
 
-def _gates(account: EnergyAccount) -> Iterator[str]:
-    """What the energy account holds back."""
-    if account.gated and account.tank.sigma < 1.0:
+def _gates(account: EnergyAccount, allowed: float) -> Iterator[str]:
+    """Yield what the energy account holds back, beyond the share of springs that limits allow."""
+    if not account.gated:
+        return
+    tank = account.tank
+    if tank.sigma < 1.0:
         yield "decoupling reduced since the energy tank was low: damping or ~/refill restores it"
-    if account.gated and account.tank.grip < 1.0:
-        yield "energy reserve low: impedance yields"
+    if tank.nu < allowed:
+        if tank.nu <= RELEASED:
+            yield "energy reserve spent: springs released, damping and gravity compensation hold"
+        else:
+            yield "energy reserve low: springs yield"
+    if tank.damping < 1.0:
+        yield "dampers feed motions since torques come late: damping reduced"

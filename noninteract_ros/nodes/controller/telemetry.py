@@ -143,7 +143,7 @@ class Telemetry:
     def publish(self, stamp: int, core: TeamController, tick: Tick) -> None:
         """Publish a tick with the stamp [ns] of the state it answers."""
         self._tick = tick
-        self.safety.note(seconds(stamp), tick)
+        self.safety.record(seconds(stamp), tick)
         slices = self._stack.slices
         count = round(seconds(stamp) * self._rate) if self._lockstep else self._ticks
         due = count % self._period == 0
@@ -226,8 +226,9 @@ def account_values(account: EnergyAccount) -> dict[str, object]:
     """Return the energy account as values for `/diagnostics`."""
     tank = account.tank
     return {
-        "sigma": tank.sigma,
-        "grip": tank.grip,
+        "sigma": account.sigma,
+        "nu": tank.nu,
+        "damping": tank.damping,
         "tank [J]": tank.level,
         "owed [J]": tank.owed,
         "reserve [J]": tank.reserve,

@@ -29,8 +29,8 @@ def account_figure(recorded: Recorded) -> Figure:
     _draw(powers, found.t, ("supplied", found.supplied), ("dissipated", found.dissipated))
     _draw(powers, found.t, ("decoupling demand $P$", found.demand), first=2)
     # Laws without gates have no curves.
-    sigma, grip = (np.where(found.gated, gate, np.nan) for gate in (found.sigma, found.grip))
-    _draw(gates, found.t, ("decoupling $\\sigma$", sigma), ("impedance $\\nu$", grip))
+    sigma, nu = (np.where(found.gated, gate, np.nan) for gate in (found.sigma, found.nu))
+    _draw(gates, found.t, ("decoupling $\\sigma$", sigma), ("springs $\\nu$", nu))
     gates.lines[1].set_linestyle((0, (4, 3)))  # The curves often coincide.
     gates.set_ylim(-MARGIN, 1.0 + MARGIN)
     _draw(sums, found.t, ("received", _cumulative(found)), ("residual", found.residual))

@@ -37,7 +37,7 @@ class TeamAccount:
         owed: Energy that must be received before sigma may rise [J].
         reserve: Energy in the reserve [J].
         sigma: Decoupling gate.
-        grip: Impedance gate nu.
+        nu: Gate of the springs.
         residual: Growth of all storage beyond all received energy [J].
         received: Work of the environment since the start of the account [J].
         measured: Integral of `supplied` since then [J].
@@ -58,7 +58,7 @@ class TeamAccount:
     owed: Array
     reserve: Array
     sigma: Array
-    grip: Array
+    nu: Array
     residual: Array
     received: Array
     measured: Array
@@ -97,8 +97,8 @@ def account_metrics(recorded: Recorded) -> tuple[dict[str, Any], list[Check]]:
         "gated_s": float(steps[gated].sum()),
         "sigma_min": float(found.sigma[gated].min()) if gated.any() else None,
         "sigma_below_1_s": float(steps[gated & (found.sigma < 1.0)].sum()),
-        "nu_min": float(found.grip[gated].min()) if gated.any() else None,
-        "nu_below_1_s": float(steps[gated & (found.grip < 1.0)].sum()),
+        "nu_min": float(found.nu[gated].min()) if gated.any() else None,
+        "nu_below_1_s": float(steps[gated & (found.nu < 1.0)].sum()),
         "residual_max_J": float(found.residual.max()),
         "tank_min_J": float(found.tank.min()),
         "tank_max_J": float(found.tank.max()),
@@ -158,6 +158,6 @@ def limits_acted(recorded: Recorded, found: TeamAccount) -> bool:
     if INTERVENTIONS not in series.labels:
         return False
     rows, others = common_times(recorded.since_start(series.stamps), found.t)
-    both_open = (found.sigma[others] == 1.0) & (found.grip[others] == 1.0)
+    both_open = (found.sigma[others] == 1.0) & (found.nu[others] == 1.0)
     more = np.diff(series[INTERVENTIONS][rows]) > 0.0
     return bool((more & both_open[1:] & both_open[:-1]).any())

@@ -4,7 +4,8 @@
 from typing import Any
 
 from noninteract_ros.arrays import Array
-from noninteract_ros.validation.gauntlet.account import compiled_account
+from noninteract_ros.control.energy.tank import Interval
+from noninteract_ros.validation.gauntlet.account import account_step, whole
 from noninteract_ros.validation.gauntlet.arrays import TeamArrays, compiled, copy
 from noninteract_ros.validation.gauntlet.law import (
     GRAVITATIONAL,
@@ -18,17 +19,19 @@ from noninteract_ros.validation.gauntlet.law import (
 )
 from noninteract_ros.validation.gauntlet.state import GATED, NATURAL, PAPER, Memory, Meter
 
-ACCOUNT = compiled_account()
-account_step, full_tank, observed = ACCOUNT.step, ACCOUNT.full_tank, ACCOUNT.observed
-Interval = ACCOUNT.interval
+
+@compiled
+def gates_of(law: int, tank: Any, before: Any) -> Any:
+    """Return the account with the gates of a law."""
+    return tank if law == GATED else whole(tank, before)
 
 
 @compiled
-def gates_of(law: int, tank: Any) -> Any:
-    """Return the account with the gates of a law."""
+def sigma_of(law: int, tank: Any) -> float:
+    """Return the gate of the decoupling in force."""
     if law == GATED:
-        return tank
-    return observed(tank, 0.0 if law == NATURAL else 1.0)
+        return tank.sigma
+    return 0.0 if law == NATURAL else 1.0
 
 
 @compiled
@@ -44,20 +47,32 @@ def book(
     meter: Meter,
 ) -> Any:
     """Return the account after the interval since the last received state."""
-    elapsed, natural, beyond, error = now - memory.received[0], 0.0, 0.0, 0.0
+    elapsed, natural, beyond, error, damped = now - memory.received[0], 0.0, 0.0, 0.0, 0.0
     for i in range(team.n):
         step = memory.q[i] - memory.q_received[i]
         natural += applied[0, i] * step
         beyond += applied[1, i] * step
+        damped += applied[2, i] * step
         error += (applied[0, i] + applied[1, i]) * (step - elapsed * memory.v_received[i])
     meter.naive[0] += error
     natural -= terms.energies[GRAVITATIONAL] - memory.received[1]
-    impedance_force(team, terms, 1.0, memory.force[0])
+    impedance_force(team, terms, 1.0, 1.0, memory.force[0])
     complete_force(team, terms, law == PAPER, memory.force[0], memory.force[1])
     demand = power(team, terms, memory.force[1])
     U, V = potential(team, terms), storage(team, terms)
-    interval = Interval(elapsed, natural, beyond, 0.0, U, U, 0.0, V, demand)
-    return gates_of(law, account_step(tank, interval, settings))
+    interval = Interval(
+        step=elapsed,
+        decoupling_work=beyond,
+        other_work=natural,
+        damped=damped,
+        arrived=U,
+        potential=U,
+        margins=0.0,
+        led=0.0,
+        storage=V,
+        demand=demand,
+    )
+    return gates_of(law, account_step(tank, interval, settings), tank)
 
 
 @compiled
@@ -71,7 +86,7 @@ def store_state(team: TeamArrays, terms: Terms, memory: Memory, now: float) -> N
 @compiled
 def stored(terms: Terms, tank: Any) -> float:
     """Return W, the storage of the port [J]."""
-    return terms.energies[KINETIC] + tank.grip * tank.potential + tank.reserve + tank.level
+    return terms.energies[KINETIC] + tank.nu * tank.potential + tank.reserve + tank.level
 
 
 @compiled

@@ -153,7 +153,7 @@ def _in_detail(settings: GauntletSettings, named: Sequence[Verdict]) -> Section:
         if item.law in GUARANTEED:
             case = make_case(settings.seed, item.index, settings.reaction)
             rate = "-" if item.growth is None else f"{item.growth:.3g}"
-            numbers = item.time, item.speed, item.sigma, item.grip
+            numbers = item.time, item.speed, item.sigma, item.nu
             rows.append((str(item.index), item.law, case.kind, item.cause, rate, *numbers))
     columns = ("case", "law", "kind", "cause", "growth rate [1/s]", "time [s]", "speed", "σ", "ν")
     return Section("passive laws not at rest", columns, tuple(rows))

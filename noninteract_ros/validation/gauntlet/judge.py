@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.control.energy.tank import levels
 from noninteract_ros.validation.gauntlet import state
-from noninteract_ros.validation.gauntlet.accounting import ACCOUNT
+from noninteract_ros.validation.gauntlet.accounting import sigma_of
 from noninteract_ros.validation.gauntlet.cases import Case
 from noninteract_ros.validation.gauntlet.law import new_terms
 from noninteract_ros.validation.gauntlet.loop import growth_rate, plant_of
@@ -44,8 +45,8 @@ class Verdict:
         sigma_least: Smallest sigma.
         sigma_full: Share of time with sigma = 1.
         sigma: Last sigma.
-        grip: Last nu.
-        grip_least: Smallest nu.
+        nu: Last nu.
+        nu_least: Smallest nu.
         level_least: Smallest level of the tank [J].
         residual: Largest r = W - W(0) - supplied energy, less the imbalance.
         mismatch: Largest |r + L|, less the imbalance.
@@ -66,8 +67,8 @@ class Verdict:
     sigma_least: float
     sigma_full: float
     sigma: float
-    grip: float
-    grip_least: float
+    nu: float
+    nu_least: float
     level_least: float
     residual: float
     mismatch: float
@@ -83,7 +84,7 @@ class Verdict:
     @property
     def yields(self) -> bool:
         """True if the impedance gate is nearly closed."""
-        return self.grip < YIELDED
+        return self.nu < YIELDED
 
     @property
     def unstable(self) -> bool:
@@ -145,8 +146,8 @@ def _run(
     memory = state.new_memory(case.start, n, settings.delay)
     meter = state.new_meter()
     none = np.zeros((0, state.TRACED + 2 * case.start.shape[1] + n))
-    tank = ACCOUNT.settings_of(settings.tank)
-    withheld = ACCOUNT.settings_of(replace(settings.tank, refill_fraction=0.0))
+    tank = levels(settings.tank, settings.tank.reference_credit)
+    withheld = levels(settings.tank, settings.tank.reference_credit, refills=False)
     link = state.DelayedLink(settings.period, settings.delay, settings.drop, case.index)
     ended, ticks, account = run(
         case.team,
@@ -176,7 +177,7 @@ def _judged(
     ended, ticks, account, memory, meter = _run(case, plant, law, settings, limits)
     growth = None
     if linear:
-        gates = account.sigma, account.grip
+        gates = sigma_of(LAWS.index(law), account), account.nu, account.damping
         growth = growth_rate(case, settings.period, settings.delay, *gates)
     scale = float(memory.began.sum())
     imbalance = float(meter.imbalance[0])
@@ -193,9 +194,9 @@ def _judged(
         sigma_mean=float(meter.sums[0] / meter.sums[2]),
         sigma_least=float(meter.least[0]),
         sigma_full=float(meter.sums[1] / meter.sums[2]),
-        sigma=account.sigma,
-        grip=account.grip,
-        grip_least=float(meter.least[1]),
+        sigma=sigma_of(LAWS.index(law), account),
+        nu=account.nu,
+        nu_least=float(meter.least[1]),
         level_least=float(meter.least[2]),
         residual=(float(meter.residual[0]) - imbalance) / scale,
         mismatch=(float(meter.mismatch[0]) - imbalance) / scale,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The laws in compiled form for references at rest; tests compare them with the controller.
 
-Torque of all laws: J' (F_n + sigma F_a) + g with F_n = -nu (D de/dt + K e) and F_a the force of
+Torque of all laws: J' (F_n + sigma F_a) + g with F_n = -(d D de/dt + nu K e) and F_a the force of
 complete decoupling beyond the natural law, Lambda (a_non - a_nat).
 """
 
@@ -153,11 +153,13 @@ def at_tools(team: TeamArrays, terms: Terms, q: Array, v: Array) -> None:
 
 
 @compiled
-def impedance_force(team: TeamArrays, terms: Terms, grip: float, force: Array) -> None:
-    """force = F_n."""
+def impedance_force(
+    team: TeamArrays, terms: Terms, nu: float, damping: float, force: Array
+) -> None:
+    """Write F_n with the gates of springs and dampers."""
     for i in range(team.n):
-        pull = team.damping[i] * terms.e_rate[i] + team.stiffness[i] * terms.e[i]
-        force[i] = -grip * pull
+        damped, pulled = team.damping[i] * terms.e_rate[i], team.stiffness[i] * terms.e[i]
+        force[i] = -(damping * damped + nu * pulled)
 
 
 @compiled

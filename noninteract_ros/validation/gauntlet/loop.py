@@ -62,7 +62,9 @@ def held(case: Case, inertia: Array, period: float) -> tuple[Array, Array]:
     return np.ascontiguousarray(tick[: 2 * m]), np.ascontiguousarray(0.5 * (loss + loss.T))
 
 
-def growth_rate(case: Case, period: float, delay: int, sigma: float, grip: float) -> float:
+def growth_rate(
+    case: Case, period: float, delay: int, sigma: float, nu: float, damping: float = 1.0
+) -> float:
     """Return the largest growth rate of the sampled loop with constant gates [1/s].
 
     The monodromy matrix acts on the state of the plant and on the delayed torques.
@@ -72,7 +74,8 @@ def growth_rate(case: Case, period: float, delay: int, sigma: float, grip: float
         period: Time from tick to tick [s].
         delay: Ticks between a state and its torque.
         sigma: Gate of the decoupling.
-        grip: Gate of the impedance.
+        nu: Gate of the springs.
+        damping: Gate of the dampers.
     """
     n, m = case.team.n, case.start.shape[1]
     inertia = case.around.inertia.copy()
@@ -82,8 +85,8 @@ def growth_rate(case: Case, period: float, delay: int, sigma: float, grip: float
     feedback = np.zeros((n, 2 * m))
     shaped = _shaping(case, sigma)
     A = case.team.mixing
-    feedback[:, :n] = -grip * A.T @ shaped @ (case.team.stiffness[:, None] * A)
-    feedback[:, m : m + n] = -grip * A.T @ shaped @ (case.team.damping[:, None] * A)
+    feedback[:, :n] = -nu * A.T @ shaped @ (case.team.stiffness[:, None] * A)
+    feedback[:, m : m + n] = -damping * A.T @ shaped @ (case.team.damping[:, None] * A)
     if delay == 0:
         monodromy = state + force @ feedback
     else:

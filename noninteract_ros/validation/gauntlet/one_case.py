@@ -33,7 +33,7 @@ OUTCOMES = ("law", "state", "cause", "time [s]", "growth [1/s]", "mean σ", "σ"
 
 def _outcome(item: Verdict) -> tuple[Any, ...]:
     growth = "-" if item.growth is None else f"{item.growth:.4g}"
-    numbers = item.sigma_mean, item.sigma, item.grip, item.residual
+    numbers = item.sigma_mean, item.sigma, item.nu, item.residual
     return (item.law, item.state, item.cause, item.time, growth, *numbers)
 
 
@@ -57,17 +57,15 @@ def _course(case: Case, settings: GauntletSettings, verdict: Verdict) -> Section
     seconds = min(verdict.time, SECONDS)
     stride = max(1, round(seconds * settings.rate / ROWS))
     table = trace(case, verdict.law, settings, ROWS, stride)
-    t, sigma, grip, level, reserve, lost, potential, kinetic, environment, residual = table[
-        :, :10
-    ].T
+    t, sigma, nu, level, reserve, lost, potential, kinetic, environment, residual = table[:, :10].T
     columns = (
         t,
         sigma,
-        grip,
+        nu,
         level,
         reserve,
         lost,
-        grip * potential + kinetic,
+        nu * potential + kinetic,
         environment,
         residual,
     )

@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from noninteract_ros.arrays import Array
+from noninteract_ros.validation.gauntlet.account import full_tank
 from noninteract_ros.validation.gauntlet.accounting import (
     book,
-    full_tank,
-    gates_of,
+    sigma_of,
     store_state,
     stored,
     update_residual,
@@ -52,27 +52,31 @@ from noninteract_ros.validation.gauntlet.state import (
 def command(
     team: TeamArrays, terms: Terms, law: int, memory: Memory, tank: Any, to: Array
 ) -> None:
-    """Write the torques of impedance plus gravity and of decoupling, shape (2, n)."""
+    """Write the torques of impedance plus gravity, decoupling and D de/dt, shape (3, n)."""
     pull, beyond = memory.force
-    impedance_force(team, terms, tank.grip, pull)
+    for i in range(team.n):
+        pull[i] = team.damping[i] * terms.e_rate[i]
+    multiply_transposed(terms.J, pull, to[2])
+    impedance_force(team, terms, tank.nu, tank.damping, pull)
     multiply_transposed(terms.J, pull, to[0])
     if law != NATURAL:
         complete_force(team, terms, law == PAPER, pull, beyond)
         multiply_transposed(terms.J, beyond, to[1])
     for i in range(team.n):
         to[0, i] += terms.gravity[i]
-        to[1, i] *= tank.sigma
+        to[1, i] *= sigma_of(law, tank)
 
 
 @compiled
-def update_meter(meter: Meter, tank: Any, speed: float) -> None:
+def update_meter(meter: Meter, law: int, tank: Any, speed: float) -> None:
     """Update the statistics of a tick."""
+    sigma = sigma_of(law, tank)
     meter.peak[0], meter.last[0] = max(meter.peak[0], speed), max(meter.last[0], speed)
-    meter.sums[0] += tank.sigma
-    meter.sums[1] += 1.0 if tank.sigma >= 1.0 else 0.0
+    meter.sums[0] += sigma
+    meter.sums[1] += 1.0 if sigma >= 1.0 else 0.0
     meter.sums[2] += 1.0
-    meter.least[0] = min(meter.least[0], tank.sigma)
-    meter.least[1] = min(meter.least[1], tank.grip)
+    meter.least[0] = min(meter.least[0], sigma)
+    meter.least[1] = min(meter.least[1], tank.nu)
     meter.least[2] = min(meter.least[2], tank.level)
 
 
@@ -132,9 +136,17 @@ def move(
 
 
 @compiled
-def record(row: Array, t: float, tank: Any, terms: Terms, memory: Memory, meter: Meter) -> None:
+def record(
+    row: Array, t: float, law: int, tank: Any, terms: Terms, memory: Memory, meter: Meter
+) -> None:
     """Write a row of a trace: time, gates, account, energies, residual, q, v, torque."""
-    row[0], row[1], row[2], row[3], row[4] = t, tank.sigma, tank.grip, tank.level, tank.reserve
+    row[0], row[1], row[2], row[3], row[4] = (
+        t,
+        sigma_of(law, tank),
+        tank.nu,
+        tank.level,
+        tank.reserve,
+    )
     row[5], row[6], row[7] = tank.lost, tank.potential, terms.energies[KINETIC]
     row[8], row[9] = memory.environment[0] + memory.environment[1], meter.now[0]
     m, n = len(memory.q), len(memory.torque)
@@ -156,7 +168,7 @@ def begin(
 ) -> Any:
     """Return the initial account and initialize the memory."""
     observe(team, terms, memory.q, memory.v)
-    tank = gates_of(law, full_tank(settings, potential(team, terms)))
+    tank = full_tank(settings, potential(team, terms))
     memory.environment[0], memory.environment[1] = environment_energy(
         plant, team, around, memory.q, memory.v
     )
@@ -221,11 +233,14 @@ def run(
             before = (newest + slots - 1) % slots
             copy(memory.pending[before, 0], memory.pending[newest, 0])
             copy(memory.pending[before, 1], memory.pending[newest, 1])
+            copy(memory.pending[before, 2], memory.pending[newest, 2])
         for i in range(team.n):
             memory.torque[i] = memory.pending[k % slots, 0, i] + memory.pending[k % slots, 1, i]
-        update_meter(meter, tank, np.sqrt(2.0 * (terms.energies[KINETIC] + memory.environment[1])))
+        update_meter(
+            meter, law, tank, np.sqrt(2.0 * (terms.energies[KINETIC] + memory.environment[1]))
+        )
         if k % stride == 0 and k // stride < len(trace):
-            record(trace[k // stride], now, tank, terms, memory, meter)
+            record(trace[k // stride], now, law, tank, terms, memory, meter)
         verdict = verdict_of(team, terms, memory, k, limits, meter)
         if verdict != UNSETTLED:
             return verdict, k + 1, tank

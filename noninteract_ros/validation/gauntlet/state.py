@@ -88,7 +88,7 @@ class Memory(NamedTuple):
         v: Velocity of the plant, shape (m,).
         q_received: Configuration of the team in the last received state, shape (n,).
         v_received: Velocity of the team in the last received state, shape (n,).
-        pending: Delayed torques of impedance and decoupling, shape (delay + 1, 2, n).
+        pending: Delayed torques of impedance, decoupling and open dampers, (delay + 1, 3, n).
         torque: Applied torque, shape (n,).
         force: Work space for task forces, shape (n,) each.
         received: Time and gravitational energy of the last received state.
@@ -124,7 +124,7 @@ def new_memory(start: Array, n: int, delay: int) -> Memory:
         v=start[1].copy(),
         q_received=np.zeros(n),
         v_received=np.zeros(n),
-        pending=np.zeros((delay + 1, 2, n)),
+        pending=np.zeros((delay + 1, 3, n)),
         torque=np.zeros(n),
         force=(np.zeros(n), np.zeros(n)),
         received=np.zeros(2),
