@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The controller of a team, without ROS: states and inputs in, torques and accounts out."""
+"""Controller of a team, without ROS: states and inputs in, torques and accounts out."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -47,7 +47,7 @@ DEFAULT_SAFETY, DEFAULT_TANK = SafetySettings(), TankSettings()
 
 
 class TeamController:
-    """Leads a team's subtasks: decoupling, impedance, authority, bumpless changes.
+    """Control of a team's subtasks: decoupling, impedance, authority, bumpless changes.
 
     Args:
         team: The robots.
@@ -55,13 +55,13 @@ class TeamController:
         law: One of `decoupling.LAWS`.
         impedances: Gains, by subtask in the stack's order.
         inputs: Authority, timeouts and limits, in the same order.
-        transition_time: How long a change of law or gains fades in [s].
+        transition_time: Time in which a change of law or gains fades [s].
         stop_rate: Decay rate of fast motions after a stop, once it is in full force [1/s].
-        state_timeout: Gap between states after which every subtask starts anew [s].
+        state_timeout: Gap between states after which every subtask holds anew [s].
         safety: Behaviour at singularities and joint limits.
         tank: Capacity, levels and rates of the energy account.
-        measured: Whether wrenches on the tools will be given; else a momentum observer estimates
-            what acts from outside.
+        measured: True where wrenches on the tools will be given; else a momentum observer
+            estimates the external torque.
         walls: Constraints that joints and bodies keep, or None.
     """
 
@@ -90,24 +90,24 @@ class TeamController:
         self._mode = Mode(law, stack_impedance(stack.subtasks, impedances))
         self._continuity = Continuity(team, state_timeout)
         self.gate = EnergyGate(team, stack, tank)
-        self.outside = ExternalTorque(team, measured, tank.observer_gain)
+        self.external = ExternalTorque(team, measured, tank.observer_gain)
         self._springs, self._goals = StiffnessRamp(transition_time), ForceGoals(team.n)
         max_jerk = np.concatenate([item.max_jerk for item in self.inputs.values()])
         self._law = ActiveLaw(self.gate, self._goals, transition_time, Stop(stop_rate, max_jerk))
         best = best_regularity(team, stack)
-        scout = SingularityEscape(team, stack, best, safety.singularity_begin)
-        self._guard = SingularityGuard(team, safety, best, scout)
+        escape = SingularityEscape(team, stack, best, safety.singularity_begin)
+        self._guard = SingularityGuard(team, safety, best, escape)
         self._margins, self._limiter = JointMargins(team, safety), TorqueLimiter(team, safety)
         self._onset: Array = np.zeros(team.n)
         self._walls = WallGuard(team, stack, walls, tank.observer_gain) if walls else None
 
     @cached_property
     def _view(self) -> TeamEvaluator:
-        """How states are evaluated."""
+        """Evaluator of states."""
         return make_evaluator(self.team, self.stack)
 
     def prepare(self) -> None:
-        """Has everything compiled that a step needs; otherwise the first step waits for that."""
+        """Compile everything that a step needs; otherwise the first step does."""
         self._layout.prepare()
         _ = self._view
 
@@ -121,7 +121,7 @@ class TeamController:
         self._change(replace(self._mode, law=law))
 
     def set_impedance(self, subtask: str, settings: ImpedanceSettings) -> None:
-        """Changes one subtask's gains without a bump.
+        """Change one subtask's gains without a bump.
 
         Raises:
             ScenarioError: The gains do not fit the subtask; nothing is changed.
@@ -129,15 +129,15 @@ class TeamController:
         changed = list(self._settings)
         changed[self.stack.names.index(subtask)] = settings
         impedance = stack_impedance(self.stack.subtasks, changed)
-        self._springs.forget()
+        self._springs.reset()
         if self._mode.law == GATED:
             impedance = self._springs.begin(self._mode.impedance, impedance)
         self._change(replace(self._mode, impedance=impedance))
         self._settings = changed
 
     @property
-    def feels(self) -> bool:
-        """Whether a force is regulated, so that each step needs to know the external one."""
+    def regulates_forces(self) -> bool:
+        """True where a force is regulated, so that each step needs the external one."""
         return bool(self._mode.impedance.goal_gain.any())
 
     @property
@@ -146,16 +146,16 @@ class TeamController:
         return self._springs.waiting
 
     def set_authority(self, subtask: str, authority: str) -> None:
-        """Hands one subtask to another source without a bump."""
+        """Hand one subtask to another source without a bump."""
         self.inputs[subtask].authority = authority
 
     def stop(self) -> None:
-        """Damps the team to rest and ignores every input until `resume`."""
+        """Damp the team to rest and ignore every input until `resume`."""
         self._change(replace(self._mode, stopped=True))
 
     def resume(self) -> None:
-        """Leaves a stop: every subtask holds where it is until it hears from its source."""
-        self._forget_inputs()
+        """End a stop: every subtask holds where it is until its source sends again."""
+        self._discard_inputs()
         self._change(replace(self._mode, stopped=False))
 
     def reset(self) -> None:
@@ -163,24 +163,24 @@ class TeamController:
 
         Law, gains and a stop remain.
         """
-        self._continuity.forget()
+        self._continuity.reset()
         self._law.reset()
         self.gate.reset()
         self._limiter.reset()
         for item in self.inputs.values():
             item.reset()
 
-    def put_back(self) -> None:
-        """Begin anew where the team was put while its time goes on; subtasks hold until led.
+    def reset_state(self) -> None:
+        """Begin anew at the next state while the team's time goes on; subtasks hold until led.
 
         The account goes on as well: a team that is moved by hand has earned nothing.
         """
-        self._continuity.put_back()
-        self._law.reset()  # What still fades would push the team from where it was put.
+        self._continuity.interrupt()
+        self._law.reset()  # What still fades would push the team from where it was reset to.
         self.gate.interrupt()
-        self._forget_inputs()
+        self._discard_inputs()
 
-    def _forget_inputs(self) -> None:
+    def _discard_inputs(self) -> None:
         for item in self.inputs.values():
             item.discard_inputs()
 
@@ -196,7 +196,7 @@ class TeamController:
         applied: Array | None = None,
         wrenches: Array | None = None,
     ) -> Tick:
-        """Torque for the time from `now` to the next tick.
+        """Return the torque from `now` to the next tick, with all results.
 
         Args:
             now: Time of the state [s]; later than at the last step.
@@ -214,13 +214,13 @@ class TeamController:
         previous = self._law.previous
         stopped = self._mode.stopped and (previous is None or previous.stopped)
         # A team that looks for a way out of a singularity must not hold what lies inside it.
-        lost = self._guard.lost
-        if restarted or stopped or lost or (previous and previous.stopped):
+        searching = self._guard.searching
+        if restarted or stopped or searching or (previous and previous.stopped):
             self._rest_at(seen.task.x)
         if restarted:
             self._guard.reset()
-            self._goals.forget()
-            self.outside.reset()
+            self._goals.reset()
+            self.external.reset()
             if self._walls:
                 self._walls.reset()
             self.gate.interrupt()
@@ -230,7 +230,7 @@ class TeamController:
         regular = self._guard.relative(seen.dynamics.inverse_sizes)
         relative = min(regular, self.stack.singularity_distance(seen.state))
         share = self._guard.law_share(relative)
-        self.outside.see(step, q, v, applied)
+        self.external.update(step, q, v, applied)
         if self._walls:
             self._walls.update(step, seen, applied)
             led = self._walls.governed(led, self._mode.stopped, share == 1.0)
@@ -257,8 +257,8 @@ class TeamController:
         self.gate.record(command)
         torque = command.torque
         self._regulate(seen, wrenches, step, held=share < 1.0 or safety.acted)
-        self._continuity.note(now, q)
-        self.outside.note(torque)
+        self._continuity.record(now, q)
+        self.external.record(torque)
         if self._walls:
             self._walls.record(torque)
         return Tick(
@@ -295,11 +295,11 @@ class TeamController:
         self.gate.deepen(self._margins.potential(depth, self._onset))
 
     def _regulate(self, seen: Evaluation, wrenches: Array | None, step: float, held: bool) -> None:
-        """Integrates what is missing of the force goals, unless something holds the law back."""
-        if not self.feels:
+        """Integrate what is missing of the force goals, unless something holds the law back."""
+        if not self.regulates_forces:
             return
         held = held or self._mode.stopped or self.gate.account.closing
-        pressing = -seen.dynamics.force_of(self.outside.torque(seen.state, wrenches))
+        pressing = -seen.dynamics.force_of(self.external.torque(seen.state, wrenches))
         self._goals.advance(self._mode.impedance, pressing, step, held)
 
     def _terms(
@@ -338,7 +338,7 @@ class TeamController:
         )
 
     def energy(self, tick: Tick, external_torque: Array) -> Energy:
-        """Storage functions (32) and their rates (33) of a tick.
+        """Return storage functions (32) and their rates (33) of a tick.
 
         What the limits of the joints add to the torque acts on the subtasks as if from outside.
 

@@ -7,7 +7,7 @@ from noninteract_ros.team.team import Team
 
 
 def make_evaluator(team: Team, stack: SubtaskStack) -> TeamEvaluator:
-    """Robot by robot, where the subtasks allow it; this imports numba and what it has compiled."""
+    """Return a robot-by-robot evaluator where the subtasks allow it; this imports numba."""
     from noninteract_ros.control.fast.robotwise_evaluation import RobotwiseEvaluator
 
     return RobotwiseEvaluator.of(team, stack) or DenseEvaluator(team, stack)

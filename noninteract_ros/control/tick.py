@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a controller works now, and what one step of it found."""
+"""Mode of a controller, and the results of one step."""
 
 from dataclasses import dataclass
 
@@ -16,12 +16,12 @@ from noninteract_ros.team.team import TeamState
 
 @dataclass(frozen=True)
 class Mode:
-    """How the torque is made; a change is bumpless.
+    """Law, gains and stop; a change is bumpless.
 
     Attributes:
         law: One of `decoupling.LAWS`.
         impedance: Gains of all subtasks.
-        stopped: Damps to rest instead of following the law.
+        stopped: True while the team is damped to rest instead of following the law.
     """
 
     law: str
@@ -31,7 +31,7 @@ class Mode:
 
 @dataclass(frozen=True, slots=True)
 class Tick:
-    """Everything that one step of the controller found and decided.
+    """Results of one step of the controller.
 
     Attributes:
         torque: Control torque, shape (n,) [N or N m].
@@ -39,16 +39,16 @@ class Tick:
         task: Actual subtask values and Jacobians.
         x_rate: Actual subtask velocities, shape (n,) [m/s; rad/s].
         error: Tracking state of the subtasks.
-        led: What each subtask is asked to do.
+        led: Command of each subtask.
         dynamics: Task dynamics at the state.
-        task_acceleration: Commanded task acceleration, of law and recovery, shape (n,) [m/s^2].
+        task_acceleration: Commanded task acceleration before limits, shape (n,) [m/s^2].
         feedback: Coupling force D e_rate + h(e) of each subtask, which an operator's device
             feels, shape (n,) [N].
-        law_share: Share of the law in the joint acceleration; below 1 near a singularity.
+        law_share: Share of the decoupling that the state allows; below 1 near a singularity.
         regularity: Regularity of the task Jacobian, relative to the team's best.
-        added_torque: What the limits of the joints added to the torque, shape (n,) [N or N m].
-        safety: Why they did.
-        restarted: Why every subtask was put to rest where it is, or an empty text.
+        added_torque: Torque that limits of the joints added, shape (n,) [N or N m].
+        safety: Their interventions.
+        restarted: Why every subtask holds where it is, or "".
         account: The energy account as of this tick, kept whatever the law.
         law: Law in force.
         in_transition: True where the torque is not that of this law and these gains alone: a

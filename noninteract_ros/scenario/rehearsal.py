@@ -98,7 +98,7 @@ class Rehearsal:
             for stamp, reference in announcer.announce(now, feedback):
                 if reference is not None:
                     inputs.receive(stamp / 1e9, reference, now)
-        if self.controller.feels and self.simulation.tick % self._telemetry_period == 0:
+        if self.controller.regulates_forces and self.simulation.tick % self._telemetry_period == 0:
             self._wrenches = self.simulation.external_wrenches() * self._has_sensor[:, None]
         wrenches = self._wrenches
         tick = self.controller.step(now, self.q, self.simulation.v, wrenches=wrenches)

@@ -149,7 +149,7 @@ def test_damping_rises_from_zero_and_is_in_force_at_once_after_a_reset() -> None
     assert [stop.damping(7.0 + t) for t in (0.0, 0.05, 0.1, 1.0)] == pytest.approx(
         [0.0, 20.0, 40.0, 40.0]
     )
-    stop.forget()
+    stop.reset()
     assert stop.damping(0.0) == pytest.approx(40.0)
 
 

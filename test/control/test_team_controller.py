@@ -327,7 +327,7 @@ def test_a_team_put_back_is_pushed_by_nothing_of_before(stops):
         loop.controller.stop()
         loop.tick()
     loop.simulation.reset()
-    loop.controller.put_back()
+    loop.controller.reset_state()
     if stops:
         loop.controller.resume()
     ticks = loop.run(50)

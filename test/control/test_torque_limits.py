@@ -47,7 +47,7 @@ def test_the_decoupling_gives_way_first_and_the_dampers_last():
     for room in np.arange(0.0, 120.0, 7.0):
         limits = LIMITS + room * np.eye(4)[0]
         shares = fitting(BASE, [along] * 4, limits)
-        assert list(shares) == sorted(shares)
+        assert (np.diff(shares) > -1e-9).all()
         left = min(4.0, (limits[0] - BASE[0]) / 30.0)
         assert sum(shares) == pytest.approx(left)
         # As many groups as there is room for are nearly whole, the cheaper ones nearly gone.

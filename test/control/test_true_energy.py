@@ -191,7 +191,7 @@ def test_a_wrong_weight_sinks_slowly_without_springs():
 
 
 def test_an_account_lasts_for_life():
-    """Switching laws, stopping, resuming, gaps and put_back grant nothing."""
+    """Switching laws, stopping, resuming, gaps and resets of the state grant nothing."""
     loop = DelayedLoop(damping=1.0)
     loop.run(0.2)
     core = loop.core
@@ -213,7 +213,7 @@ def test_an_account_lasts_for_life():
             lambda: core.set_law("energy_gated"),
             core.stop,
             core.resume,
-            core.put_back,
+            core.reset_state,
             lambda: None,
         )
     ):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What acts on a team from outside: measured at its tools, or estimated."""
+"""External torque on a team: measured at its tools, or estimated."""
 
 import numpy as np
 
@@ -23,22 +23,22 @@ class ExternalTorque:
         self._sent: Array = np.zeros(team.n)
 
     def reset(self) -> None:
-        """Starts anew."""
+        """Begin anew."""
         self._sent = np.zeros_like(self._sent)
         if self._observer is not None:
             self._observer.reset()
 
-    def note(self, torque: Array) -> None:
-        """Takes the torque that is sent now, shape (n,)."""
+    def record(self, torque: Array) -> None:
+        """Store the torque that is sent now, shape (n,)."""
         self._sent = torque
 
-    def see(self, elapsed: float, q: Array, v: Array, applied: Array | None) -> None:
-        """Looks at a state; `applied` is the torque until then, None the one that was sent."""
+    def update(self, elapsed: float, q: Array, v: Array, applied: Array | None) -> None:
+        """Update the estimate at a state; `applied` is the torque until then, None as sent."""
         if self._observer is not None:
             self._observer.step(elapsed, q, v, self._sent if applied is None else applied)
 
     def torque(self, state: TeamState, wrenches: Array | None) -> Array:
-        """tau_e at a state, shape (n,), with wrenches on the tools, shape (N, 6), if measured."""
+        """Return tau_e at a state, (n,), from wrenches on the tools, (N, 6), if measured."""
         if self._observer is not None:
             return self._observer.external
         if wrenches is None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What acts on a team from outside, estimated from its motion where no sensor measures it."""
+"""External torque on a team, estimated from its motion."""
 
 import numpy as np
 import pinocchio as pin
@@ -29,12 +29,12 @@ class MomentumObserver:
         self.reset()
 
     def reset(self) -> None:
-        """Starts anew with no external torque."""
+        """Begin anew with no external torque."""
         self._last: tuple[Array, Array] | None = None
         self.external: Array = np.zeros(self._team.n)
 
     def step(self, elapsed: float, q: Array, v: Array, torque: Array) -> Array:
-        """External torque as far as it is seen at a state, shape (n,) [N or N m].
+        """Return the estimate of the external torque at a state, shape (n,) [N or N m].
 
         Args:
             elapsed: Time since the last state [s].
@@ -52,7 +52,7 @@ class MomentumObserver:
         return self.external
 
     def _terms(self, q: Array, v: Array) -> tuple[Array, Array]:
-        """M v and C' v - g - F v, shape (n,) each."""
+        """Return M v and C' v - g - F v, shape (n,) each."""
         model, data = self._team.model, self._data
         M = pin.crba(model, data, q).copy()
         np.copyto(M, M.T, where=self._lower)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Stiffer springs store energy at once: they come as fast as the tank can pay for them."""
+"""Ramp of stiffness that the tank pays for: stiffer springs store energy at once."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from noninteract_ros.control.law.impedance import Impedance
 
 
 class StiffnessRamp:
-    """Leads the springs of an impedance to others, no faster than a fade and within the budget.
+    """Changes springs no faster than a fade and than the tank can pay.
 
     Args:
         duration: Shortest time that a whole change takes [s].
@@ -19,18 +19,18 @@ class StiffnessRamp:
 
     def __init__(self, duration: float) -> None:
         self._duration = duration
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """No change is under way."""
+    def reset(self) -> None:
+        """End a change where it is."""
         self._start: Impedance | None = None
         self._goal: Impedance | None = None
         self._progress = 1.0
         self._waits = False
 
     def begin(self, now: Impedance, goal: Impedance) -> Impedance:
-        """The impedance at the start of a change: its springs as they are, the rest as asked."""
-        self.forget()
+        """Return the impedance at the start of a change: its springs as they are, the rest new."""
+        self.reset()
         start = replace(goal, stiffness=now.stiffness, max_force=now.max_force)
         if not _alike(start, goal):
             self._start, self._goal, self._progress = start, goal, 0.0
@@ -38,7 +38,7 @@ class StiffnessRamp:
 
     @property
     def changing(self) -> bool:
-        """Whether a change is under way."""
+        """True while a change is under way."""
         return self._start is not None
 
     @property
@@ -54,7 +54,7 @@ class StiffnessRamp:
         tank: EnergyTank | None,
         settings: TankLevels,
     ) -> Impedance:
-        """The impedance one tick later.
+        """Return the impedance one tick later.
 
         Args:
             impedance: Gains in force.
@@ -75,11 +75,11 @@ class StiffnessRamp:
         self._progress = progress
         found = self._at(progress)
         if progress == 1.0:
-            self.forget()
+            self.reset()
         return found
 
     def _at(self, progress: float) -> Impedance:
-        """Springs part of the way."""
+        """Return the springs part of the way."""
         assert self._start is not None
         assert self._goal is not None
         if progress == 1.0:

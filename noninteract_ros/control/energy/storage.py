@@ -34,7 +34,7 @@ def energy(
     task_acceleration: Array,
     external_torque: Array,
 ) -> Energy:
-    """Storage (32) and its rate for any law; `rate = supplied - dissipated` is (33).
+    """Return storage (32) and its rate for any law; `rate = supplied - dissipated` is (33).
 
     Args:
         dynamics: Task dynamics at the state.

@@ -36,7 +36,7 @@ class TaskDynamics:
         inertia: Natural task inertia Lambda = S' M S, shape (n, n).
         slices: Coordinates of each subtask.
         inertias: M_i of each decoupled subtask, shape (p_i, p_i).
-        constant: Whether M_i was asked for as a constant (remark 2); then its C~_i is zero.
+        constant: True where M_i was asked for as a constant (remark 2); then its C~_i is zero.
     """
 
     M: Array
@@ -53,27 +53,27 @@ class TaskDynamics:
 
     @property
     def inverse_sizes(self) -> Array:
-        """Something with the Frobenius norm of S."""
+        """Array with the Frobenius norm of S."""
         return self.S
 
     def velocity(self, v: Array) -> Array:
-        """J v, shape (n,)."""
+        """Return J v, shape (n,)."""
         return self.J @ v
 
     def acceleration_of(self, v: Array, joint_acceleration: Array) -> Array:
-        """Task acceleration J a + J_rate v of a joint acceleration, shape (n,)."""
+        """Return the task acceleration J a + J_rate v of a joint acceleration, shape (n,)."""
         return self.J @ joint_acceleration + self.J_rate @ v
 
     def joint_acceleration(self, v: Array, task_acceleration: Array) -> Array:
-        """Joint acceleration S (a - J_rate v) that gives a task acceleration, shape (n,)."""
+        """Return the joint acceleration S (a - J_rate v) of a task acceleration, shape (n,)."""
         return self.S @ (task_acceleration - self.J_rate @ v)
 
     def torque(self, v: Array, joint_acceleration: Array) -> Array:
-        """M a + C v + g, shape (n,) [N or N m]."""
+        """Return M a + C v + g, shape (n,) [N or N m]."""
         return self.M @ joint_acceleration + self.C @ v + self.g
 
     def coriolis_force(self, e_rate: Array) -> Array:
-        """C~_i e_rate_i of every subtask with C~_i = S_i' (C S_i + M dS_i/dt), shape (n,)."""
+        """Return C~_i e_rate_i of every subtask, C~_i = S_i' (C S_i + M dS_i/dt), shape (n,)."""
         U = _spread_by_subtask(self, e_rate)
         W = self.C @ U - self.MS @ (self.J_rate @ U)  # dS/dt = -S J_rate S
         blocks = self.S.T @ W
@@ -84,46 +84,46 @@ class TaskDynamics:
         return force
 
     def natural_coriolis_force(self, e_rate: Array) -> Array:
-        """mu e_rate with mu = S' (C S + M dS/dt), shape (n,)."""
+        """Return mu e_rate with mu = S' (C S + M dS/dt), shape (n,)."""
         u = self.S @ e_rate
         return self.S.T @ (self.C @ u - self.MS @ (self.J_rate @ u))
 
     def force_of(self, torque: Array) -> Array:
-        """S' tau, shape (n,) [N]: the forces on the subtasks that a joint torque amounts to."""
+        """Return S' tau, shape (n,) [N]: the forces on the subtasks of a joint torque."""
         return self.S.T @ torque
 
     def torque_of(self, force: Array) -> Array:
-        """J' f, shape (n,) [N or N m]: the joint torque that forces on the subtasks amount to."""
+        """Return J' f, shape (n,) [N or N m]: the joint torque of forces on the subtasks."""
         return self.J.T @ force
 
     def multiply_by_inertia(self, acceleration: Array) -> Array:
-        """Lambda a, shape (n,)."""
+        """Return Lambda a, shape (n,)."""
         return self.inertia @ acceleration
 
     def divide_by_inertia(self, force: Array) -> Array:
-        """Lambda^-1 f, shape (n,)."""
+        """Return Lambda^-1 f, shape (n,)."""
         return np.linalg.solve(self.inertia, force)
 
     def divide_by_inertias(self, force: Array) -> Array:
-        """M_i^-1 f_i of every subtask, shape (n,)."""
+        """Return M_i^-1 f_i of every subtask, shape (n,)."""
         result = np.empty_like(force)
         for part, inertia in zip(self.slices, self.inertias, strict=True):
             result[part] = np.linalg.solve(inertia, force[part])
         return result
 
     def multiply_by_inertias(self, acceleration: Array) -> Array:
-        """M_i a_i of every subtask, shape (n,)."""
+        """Return M_i a_i of every subtask, shape (n,)."""
         result = np.empty_like(acceleration)
         for part, inertia in zip(self.slices, self.inertias, strict=True):
             result[part] = inertia @ acceleration[part]
         return result
 
     def decoupled_external_force(self, external_torque: Array) -> Array:
-        """tau~e = Gamma^-1 tau_e = M_s J M^-1 tau_e, shape (n,) [N]."""
+        """Return tau~e = Gamma^-1 tau_e = M_s J M^-1 tau_e, shape (n,) [N]."""
         return self.multiply_by_inertias(self.acceleration_under(external_torque))
 
     def acceleration_under(self, torque: Array) -> Array:
-        """J M^-1 tau, shape (n,): the task acceleration that a joint torque adds."""
+        """Return J M^-1 tau, shape (n,): the task acceleration that a joint torque adds."""
         return self.J @ np.linalg.solve(self.M, torque)
 
 
@@ -154,7 +154,7 @@ def task_dynamics(
     slices: tuple[slice, ...],
     desired_inertias: Sequence[Array | None],
 ) -> TaskDynamics:
-    """Terms that every law shares, at a state; see `task_terms`."""
+    """Return the terms that every law shares, at a state; see `task_terms`."""
     terms = (state.M, state.C, state.g, task.J, task.J_rate)
     return task_terms(*terms, slices, desired_inertias)
 
@@ -168,7 +168,7 @@ def task_terms(
     slices: tuple[slice, ...],
     desired_inertias: Sequence[Array | None],
 ) -> TaskDynamics:
-    """Terms that every law shares, from the team's own."""
+    """Return the terms that every law shares, from the team's own."""
     S = inverse(J)
     MS = M @ S
     inertia = S.T @ MS
@@ -181,9 +181,9 @@ def task_terms(
 
 
 def inverse(J: Array) -> Array:
-    """J^-1, shape (n, n); of an exactly singular J that of a neighbour, with very large entries.
+    """Return J^-1, (n, n); of an exactly singular J that of a neighbour, with large entries.
 
-    Who uses it near a singularity has to look at `singularity.regularity` first.
+    Near a singularity callers check `singularity.regularity` first.
     """
     try:
         return np.linalg.inv(J)
@@ -195,7 +195,7 @@ def inverse(J: Array) -> Array:
 def commanded_acceleration(
     law: str, dynamics: TaskDynamics, error: TaskError, impedance: Impedance
 ) -> Array:
-    """Task acceleration that a law asks for, shape (n,): the fast form.
+    """Return the task acceleration that a law asks for, shape (n,): the fast form.
 
     Of `energy_gated` it is what its open gates give; `gated_law` has the others.
 
@@ -211,7 +211,7 @@ def commanded_acceleration(
 def acceleration_against(
     law: str, dynamics: TaskDynamics, error: TaskError, feedback: Array
 ) -> Array:
-    """The same where D e_rate + h(e), or the share of it in force, is known, shape (n,)."""
+    """Return the same where D e_rate + h(e), or the share of it in force, is known, shape (n,)."""
     pull = feedback - error.force
     if error.goal is not None:
         pull = pull - error.goal
@@ -226,7 +226,7 @@ def acceleration_against(
 
 
 def paper_coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
-    """C_s,ii e_rate_i of every subtask, as Theorem 2 has it, shape (n,)."""
+    """Return C_s,ii e_rate_i of every subtask, as Theorem 2 has it, shape (n,)."""
     U = _spread_by_subtask(dynamics, e_rate)
     blocks = dynamics.J @ np.linalg.solve(dynamics.M, dynamics.C @ U) - dynamics.J_rate @ U
     force = np.empty_like(e_rate)
@@ -236,7 +236,7 @@ def paper_coriolis_force(dynamics: TaskDynamics, e_rate: Array) -> Array:
 
 
 def _spread_by_subtask(dynamics: TaskDynamics, e_rate: Array) -> Array:
-    """Columns S_i e_rate_i, shape (n, number of subtasks)."""
+    """Return columns S_i e_rate_i, shape (n, number of subtasks)."""
     columns = np.zeros((len(e_rate), len(dynamics.slices)))
     for i, part in enumerate(dynamics.slices):
         columns[part, i] = e_rate[part]

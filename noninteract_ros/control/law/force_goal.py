@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Forces that subtasks are to press with: fed forward, and regulated where they are seen.
+"""Forces that subtasks are to press with: fed forward, and regulated where they are measured.
 
 What a subtask presses with is -(S' tau_e)_i, the force that its surroundings answer. The integral
 has no storage function of its own and needs none: its force is part of the decoupling, and its
@@ -24,24 +24,24 @@ class ForceGoals:
         self._integral: Array = np.zeros(dim)
         self._has_goal = Memo(_has_goal)
 
-    def forget(self) -> None:
-        """The integrals start at zero."""
+    def reset(self) -> None:
+        """Have the integrals start at zero."""
         self._integral = np.zeros_like(self._integral)
 
     def wanted(self, impedance: Impedance) -> Array | None:
-        """Force to add now, shape (n,) [N]; None where no subtask has a goal."""
+        """Return the force to add now, shape (n,) [N]; None where no subtask has a goal."""
         if not self._has_goal(impedance):
             return None
         return impedance.goal + np.where(impedance.goal_gain > 0.0, self._integral, 0.0)
 
     def advance(self, impedance: Impedance, pressing: Array, step: float, held: bool) -> None:
-        """Integrates what is missing of the goals, within bounds.
+        """Integrate what is missing of the goals, within bounds.
 
         Args:
             impedance: Goals, gains and bounds in force.
             pressing: -(S' tau_e), shape (n,) [N].
             step: Time since the last tick [s].
-            held: Whether the integrals stand still, as they do while a gate closes.
+            held: True where the integrals stand still, as they do while a gate closes.
         """
         gain, bound = impedance.goal_gain, impedance.goal_bound
         change = 0.0 if held else gain * step * (impedance.goal - pressing)

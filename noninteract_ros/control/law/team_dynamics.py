@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a controller sees of its team and subtasks at a state."""
+"""Dynamics of a team and its subtasks at a state."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields
@@ -34,10 +34,10 @@ class TeamEvaluator(Protocol):
     """Evaluates states, with matrices over the whole team or without."""
 
     def evaluate(self, q: Array, v: Array, inertias: DesiredInertias) -> Evaluation:
-        """Everything at a state, with the subtasks' desired inertias."""
+        """Return everything at a state, with the subtasks' desired inertias."""
 
     def again(self, seen: Evaluation, inertias: DesiredInertias) -> TaskDynamics:
-        """Task dynamics of the same state with other desired inertias."""
+        """Return task dynamics of the same state with other desired inertias."""
 
 
 class DenseEvaluator:
@@ -53,13 +53,13 @@ class DenseEvaluator:
         self._terms = Memo(task_terms)
 
     def evaluate(self, q: Array, v: Array, inertias: DesiredInertias) -> Evaluation:
-        """Everything at a state; what does not change is computed once."""
+        """Return everything at a state; what does not change is computed once."""
         state = self._team.state(q, v)
         task = self._stack.evaluate(state)
         return Evaluation(state, task, self._dynamics(self._terms, state, task, inertias))
 
     def again(self, seen: Evaluation, inertias: DesiredInertias) -> TaskDynamics:
-        """Task dynamics of the same state."""
+        """Return task dynamics of the same state."""
         return self._dynamics(task_terms, seen.state, seen.task, inertias)
 
     def _dynamics(
@@ -74,7 +74,7 @@ class DenseEvaluator:
 
 
 class LazyTeamState(TeamState):
-    """A state whose matrices are computed when somebody asks for one.
+    """State whose matrices are computed when first used.
 
     Args:
         team: The robots.
@@ -90,7 +90,7 @@ class LazyTeamState(TeamState):
     _team: Team
 
     def __getattr__(self, name: str) -> object:
-        """Fills all fields in."""
+        """Compute all fields."""
         if name not in {item.name for item in fields(TeamState)}:
             raise AttributeError(name)
         found = self._team.state(self.q, self.v)
@@ -100,7 +100,7 @@ class LazyTeamState(TeamState):
 
 
 class LazySubtaskState(SubtaskState):
-    """Subtask values whose Jacobians are computed when somebody asks for one.
+    """Subtask values whose Jacobians are computed when first used.
 
     Args:
         x: Stacked values, shape (size,).
@@ -114,7 +114,7 @@ class LazySubtaskState(SubtaskState):
     _dynamics: TaskDynamics
 
     def __getattr__(self, name: str) -> object:
-        """Jacobian or Jacobian rate."""
+        """Return the Jacobian or its rate."""
         if name not in ("J", "J_rate"):
             raise AttributeError(name)
         return getattr(self._dynamics, name)

@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether a state follows from the one before it."""
+"""Continuity of the states of a team."""
 
 import numpy as np
 
 from noninteract_ros.arrays import Array
 from noninteract_ros.team.team import Team
 
-JUMP = 0.1  # [m or rad] a coordinate that is this much further than it can have come was put there
+JUMP = 0.1  # [m or rad] of a coordinate beyond what its speed explains
 
 
 class Continuity:
-    """Remembers the last state and says why the next one is a new start.
+    """Compares each state with the last one.
 
     Args:
         team: The robots.
@@ -20,25 +20,25 @@ class Continuity:
     def __init__(self, team: Team, state_timeout: float) -> None:
         self._team, self._state_timeout = team, state_timeout
         self._last: tuple[float, Array] | None = None
-        self._put_back = False
+        self._interrupted = False
 
-    def put_back(self) -> None:
-        """The next state is where the team was put, however near that is."""
-        self._put_back = True
+    def interrupt(self) -> None:
+        """Have the next state begin anew, however near it is: the team's state was reset."""
+        self._interrupted = True
 
-    def forget(self) -> None:
-        """The next state is the first one."""
+    def reset(self) -> None:
+        """Have the next state be the first one."""
         self._last = None
 
     def elapsed(self, now: float) -> float:
-        """Time since the last state [s]; 0 at the first one."""
+        """Return the time since the last state [s]; 0 at the first one."""
         return 0.0 if self._last is None else now - self._last[0]
 
     def broken(self, now: float, q: Array, v: Array) -> str:
-        """Why the state does not follow, or an empty text."""
+        """Return why a state does not follow from the last one, or ""."""
         if self._last is None:
             return "the first state"
-        if self._put_back:
+        if self._interrupted:
             return "put back to its start"
         last, q_last = self._last
         if now - last > self._state_timeout:
@@ -49,6 +49,6 @@ class Continuity:
             return f"{joint} jumped by {moved.max():.3f}"
         return ""
 
-    def note(self, now: float, q: Array) -> None:
-        """Takes a state as the last one."""
-        self._last, self._put_back = (now, q), False
+    def record(self, now: float, q: Array) -> None:
+        """Store a state as the last one."""
+        self._last, self._interrupted = (now, q), False

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A difference between two modes that fades out, so that no change has a bump."""
+"""Fading difference between two modes, so that no change has a bump."""
 
 import numpy as np
 
@@ -7,7 +7,7 @@ from noninteract_ros.arrays import Array
 
 
 class Fade:
-    """Adds what was in force before a change, less what is in force after it, for a while."""
+    """Adds a difference, of before a change less after it, that fades out."""
 
     def __init__(self) -> None:
         self._duration = 1.0
@@ -19,15 +19,15 @@ class Fade:
         self._start = -np.inf
 
     def active(self, now: float) -> bool:
-        """Whether anything is left of a difference at a time [s]."""
+        """Return True while anything is left of a difference at a time [s]."""
         return now - self._start < self._duration
 
     def begin(self, now: float, difference: Array, duration: float) -> None:
-        """Starts with a difference, shape (n,), at a time [s], for a duration [s]."""
+        """Start with a difference, shape (n,), at a time [s], for a duration [s]."""
         self._difference, self._start, self._duration = difference, now, duration
 
     def added_to(self, wanted: Array, now: float) -> Array:
-        """With what is left of the difference; after the duration the very same array, (n,)."""
+        """Return a value with what is left of the difference, (n,); later the same array."""
         if not self.active(now):
             return wanted
         progress = (now - self._start) / self._duration

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Near singularities, where assumption 3 fails: the law fades out, and the team recovers."""
+"""Singularities, where assumption 3 fails: share of the decoupling, and the way out."""
 
 from typing import Protocol
 
@@ -11,19 +11,19 @@ from noninteract_ros.control.safety.settings import SafetySettings
 from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
-SAMPLES = 50  # configurations that the team's best regularity is looked for among
-REACH = np.pi  # [m or rad] how far from the initial position joints without limits are tried
+SAMPLES = 50  # configurations among which the team's best regularity is taken
+REACH = np.pi  # [m or rad] range around the initial position of joints without limits
 RAMP = 0.2  # [s] in which the pull comes, and goes at a stop
 
 
 def regularity(S: Array) -> float:
-    """1 / |J^-1|_F: smooth, zero where J is singular, at most the smallest singular value of J."""
+    """Return 1 / |J^-1|_F: smooth, 0 where J is singular, at most its least singular value."""
     norm = float(np.linalg.norm(S))
     return 1.0 / norm if np.isfinite(norm) and norm > 0.0 else 0.0
 
 
 def joint_range(team: Team) -> tuple[Array, Array]:
-    """Lowest and highest joint positions, (n,) each; without a limit, `REACH` from the start."""
+    """Return lowest and highest joint positions, (n,) each; `REACH` from q0 without a limit."""
     start = team.joints_from_configuration(team.q0)
     lower, upper = team.position_limits
     lower = np.where(np.isfinite(lower), lower, start - REACH)
@@ -31,9 +31,9 @@ def joint_range(team: Team) -> tuple[Array, Array]:
 
 
 def best_regularity(team: Team, stack: SubtaskStack) -> float:
-    """Largest regularity at the initial and at random configurations within joint limits.
+    """Return the largest regularity at q0 and at random configurations within joint limits.
 
-    The initial one alone would not do as a measure: it may be anything, a singular one too.
+    The initial one alone is no measure: it may be singular.
     """
     rng = np.random.default_rng(0)
     lower, upper = joint_range(team)
@@ -46,54 +46,54 @@ def best_regularity(team: Team, stack: SubtaskStack) -> float:
 
 
 class EscapeSearch(Protocol):
-    """Looks for a way out of a singularity, see `way_out`."""
+    """Search for a regular configuration; see `SingularityEscape`."""
 
-    def forget(self) -> None:
-        """The next search starts where the team is then."""
+    def reset(self) -> None:
+        """Have the next search start where the team is then."""
 
     def goal(self, q: Array) -> Array:
-        """Where to go from a configuration, shape (nq,)."""
+        """Return where to go from a configuration, shape (nq,)."""
 
 
 class SingularityGuard:
-    """Blends the law with a recovery, by how regular the task Jacobian is.
+    """Share of the decoupling by the regularity of J, and a pull to regular states.
 
-    The law fades out continuously as the regularity falls. In its place the team is pulled back,
-    damped, to the last configuration that was regular, and so leaves by itself. A team that was
-    never seen regular is pulled where it is led out, or only damped, if there is nobody to lead.
+    The share falls continuously with the regularity. Where it is below 1 the team is pulled back,
+    damped, to its last regular configuration. A team without one is pulled to where the escape
+    search leads, or only damped.
 
     Args:
         team: The robots.
         settings: Thresholds and gains.
         best: Regularity that counts as 1.
-        scout: Knows ever better configurations on the way out, or None.
+        escape: Search for regular configurations, or None.
     """
 
     def __init__(
-        self, team: Team, settings: SafetySettings, best: float, scout: EscapeSearch | None = None
+        self, team: Team, settings: SafetySettings, best: float, escape: EscapeSearch | None = None
     ) -> None:
         self._team, self._settings, self._best = team, settings, best
-        self._scout = scout if settings.singularity_escape else None
+        self._escape = escape if settings.singularity_escape else None
         self._regular: Array | None = None
         self._pull = 0.0
 
     @property
-    def lost(self) -> bool:
-        """Whether a way out of a singularity is being looked for."""
-        return self._regular is None and self._scout is not None
+    def searching(self) -> bool:
+        """True while a regular configuration is searched for."""
+        return self._regular is None and self._escape is not None
 
     def reset(self) -> None:
-        """Forgets the last regular configuration, as when the team is put elsewhere."""
+        """Drop the last regular configuration, as when the team is moved elsewhere."""
         self._regular, self._pull = None, 0.0
-        if self._scout is not None:
-            self._scout.forget()
+        if self._escape is not None:
+            self._escape.reset()
 
     def relative(self, S: Array) -> float:
-        """Regularity relative to the team's best, of S or of anything with its Frobenius norm."""
+        """Return the regularity of S, or of its Frobenius norm, relative to the team's best."""
         return regularity(S) / self._best
 
     def law_share(self, relative: float) -> float:
-        """Share of the law: 1 where regular, 0 at a singularity, once differentiable between."""
+        """Return the share: 1 where regular, 0 at a singularity, once differentiable between."""
         begin, end = self._settings.singularity_begin, self._settings.singularity_end
         if relative >= begin:
             return 1.0
@@ -114,9 +114,9 @@ class SingularityGuard:
             return None
         goal = self._regular
         if goal is None:
-            if self._scout is None:
+            if self._escape is None:
                 return None
-            goal = self._scout.goal(q)
+            goal = self._escape.goal(q)
         change = step / RAMP
         self._pull = max(0.0, self._pull - change) if stopped else min(1.0, self._pull + change)
         way = self._team.difference(q, goal)

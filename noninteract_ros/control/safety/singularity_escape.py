@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A way out of a singularity for a team that was put there: nobody has seen it regular."""
+"""Search for a regular configuration, for a team that starts in a singularity."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ ENOUGH = 1.3  # times the regularity at which the law is whole again
 
 
 class SingularityEscape:
-    """Looks for a regular configuration near a singular one, one trial per tick.
+    """Random search for a regular configuration near a singular one, one trial per tick.
 
     Small random steps of all joints are kept where they are more regular, within joint limits; the
     goal follows what was found, smoothly. The steps are the same in every run.
@@ -32,16 +32,16 @@ class SingularityEscape:
         self._enough = min(1.0, ENOUGH * regular)
         self._lower, self._upper = joint_range(team)
         self._still = np.zeros(team.n)
-        self.forget()
+        self.reset()
 
-    def forget(self) -> None:
-        """The next search starts where the team is then."""
+    def reset(self) -> None:
+        """Have the next search start where the team is then."""
         self._rng = np.random.default_rng(0)
         self._found: tuple[Array, float] | None = None
         self._goal: Array | None = None
 
     def goal(self, q: Array) -> Array:
-        """Where to go, shape (nq,), after one more trial.
+        """Return where to go, shape (nq,), after one more trial.
 
         Args:
             q: Where the team is, shape (nq,); the first search begins there.

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The damping that brings a stopped team to rest and keeps it there."""
+"""Damping that brings a stopped team to rest and keeps it there."""
 
 import numpy as np
 

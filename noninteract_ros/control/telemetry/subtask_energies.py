@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is told of each subtask on `<subtask>/energy`: energies, and who made the torque."""
+"""Row of each subtask on the topic `<subtask>/energy`: energies, and what made the torque."""
 
 import numpy as np
 
@@ -26,13 +26,13 @@ LABELS = (
 
 
 def rows(now: float, tick: Tick, energy: Energy, watch: LimitActivity) -> Array:
-    """A row of numbers for each subtask, shape (number of subtasks, labels).
+    """Return a row of numbers for each subtask, shape (number of subtasks, labels).
 
     Args:
         now: Time of the tick [s].
         tick: The tick.
         energy: Its storage functions.
-        watch: What has been noted up to this tick, itself included.
+        watch: Activity of limits up to this tick, itself included.
     """
     count = len(tick.led)
     leaders = [AUTHORITIES.index(led.leader) for led in tick.led]

@@ -52,7 +52,7 @@ class WallGuard:
             seen: The state.
             applied: Torque since then, shape (n,); None for the one that was recorded.
         """
-        self._external.see(elapsed, seen.state.q, seen.state.v, applied)
+        self._external.update(elapsed, seen.state.q, seen.state.v, applied)
         self._view = self._walls.view(seen, self._state)
 
     def governed(
@@ -107,7 +107,7 @@ class WallGuard:
 
     def record(self, torque: Array) -> None:
         """Store the torque that is sent, shape (n,)."""
-        self._external.note(torque)
+        self._external.record(torque)
 
     def report(self) -> WallReport:
         """Return what the walls did at this tick."""

@@ -210,7 +210,7 @@ class Controller(ScenarioNode):
         if self._reset_stamp is not None and stamp >= self._reset_stamp:
             self._reset_stamp = None
             self._supervision.reset()
-            self.core.put_back()
+            self.core.reset_state()
         now, wrenches = seconds(stamp), self._telemetry.wrenches
         try:
             tick = self.core.step(now, q, v, applied, wrenches)

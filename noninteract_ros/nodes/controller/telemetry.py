@@ -155,7 +155,7 @@ class Telemetry:
         if not due:
             return
         energy = core.energy(tick, self._team.external_torque(tick.state, self.wrenches))
-        external_torque = core.outside.torque(tick.state, self.wrenches)
+        external_torque = core.external.torque(tick.state, self.wrenches)
         self._team_energy.publish(stamp, tick, external_torque)
         energies = rows(seconds(stamp), tick, energy, self.safety)
         for i, codec in enumerate(self._codecs):
