@@ -193,7 +193,7 @@ class ActiveLaw:
                 moved = dynamics.joint_acceleration(still, fading)
                 torque = torque + share * (dynamics.torque(still, moved) - g)
             return self._with_pull(undivided(torque, dynamics), pull)
-        resistance = added.resistance(tank.nu, tank.damping)
+        resistance = added.resistance(tank.nu, share * tank.damping)
         force = np.zeros_like(resistance)
         feed_forward = None
         if share > 0.0:

@@ -241,6 +241,8 @@ class TeamController:
         terms = self._terms(now, seen, led, share, step, depth)
         self.gate.book(terms, self._mode.law, applied)
         self._deepen(depth, step)
+        if share < 1.0:  # Springs yield as a whole, so that nothing snaps through a singularity.
+            self.gate.loosen(share * self.gate.tank.nu)
         guard = self._margins.at(depth, v, self._onset)
         pull = self._guard.pull(q, share, self._mode.stopped, step)
         asked, acceleration = self._law.command(

@@ -51,7 +51,7 @@ def test_the_decoupling_gives_way_first_and_the_dampers_last():
         left = min(4.0, (limits[0] - BASE[0]) / 30.0)
         assert sum(shares) == pytest.approx(left)
         # As many groups as there is room for are nearly whole, the cheaper ones nearly gone.
-        assert sum(shares[: 4 - int(left + 1.0)]) < 0.2
+        assert sum(shares[: max(0, 4 - int(left + 1.0))]) < 0.2
 
 
 def test_shares_are_continuous():

@@ -11,6 +11,7 @@ from test_energy_gate import SOFT, DelayedLoop
 from test_singularity import SingularityLoop, controller, team
 
 from noninteract_ros.control.controller import TeamController
+from noninteract_ros.control.energy.account import model_error_text
 from noninteract_ros.control.energy.tank import EnergyTank, TankSettings
 from noninteract_ros.simulation.plant import Plant
 from noninteract_ros.simulation.team_simulation import TeamSimulation
@@ -85,6 +86,19 @@ def test_no_inertia_is_needed_where_references_rest(factor: float):
 
 
 SMALL = TankSettings(capacity=0.1, initial=0.1, reserve=0.1, full_gate=0.02, reopening_level=0.05)
+
+
+@pytest.mark.parametrize("factor", [1.0, 2.5])
+def test_a_wrong_model_is_named(factor: float):
+    """Forces and motion disagree on the received energy where the robots are not the model."""
+    loop = OtherRobots(factor, damping=1.0)
+    loop.answer()
+    loop.simulation.step(loop.tick.torque)
+    loop.run(0.15)
+    loop.answer()
+    pushed = loop.simulation.energy().pushes
+    text = model_error_text(loop.tick.account, pushed, abs(pushed))
+    assert bool(text) == (factor != 1.0)
 
 
 def drawn_in_turns(

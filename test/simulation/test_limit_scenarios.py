@@ -113,10 +113,10 @@ def test_effort_limits():
     assert np.abs(np.diff(torques, axis=0)).max() <= 300.0 / 500.0 * (1.0 + 1e-9)
     shares = found.column(lambda t: t.safety.effort_share)
     assert shares.min() < 0.5
-    # Until the push the direction of the torque is kept, and with it the grasp.
+    # Until the push the grasp is kept, although the decoupling gives way first.
     errors = found.column(error)
     assert errors[: 5 * 500, :2].max() > 0.03
-    assert errors[: 5 * 500, 2:].max() < 0.01
+    assert errors[: 5 * 500, 2:].max() < 0.015
     assert errors[-1].max() < 1e-3
     texts = {text for conditions in found.reported for text in conditions}
     assert texts == {"at effort limits", "at the torque-rate limit"}

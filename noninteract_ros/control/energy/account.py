@@ -27,6 +27,8 @@ QUANTITIES = (
     "lost",
     "account",
 )
+MODEL_ERROR = 0.5  # [J] between both ways to know what was received, beyond which it is named
+MODEL_SHARE = 0.1  # the same of the energy that went to and fro
 ROUNDING = 16.0 * float(np.finfo(float).eps)  # of what was added up, for the residual
 
 
@@ -104,6 +106,27 @@ class EnergyAccount:
     def sound(self) -> bool:
         """True where rounding explains the imbalance; False where it is no number."""
         return abs(self.imbalance) <= self.bound
+
+
+def model_error_text(account: EnergyAccount, measured: float, exchanged: float) -> str:
+    """Return a sentence where forces and motion disagree on the received energy, or "".
+
+    `received` follows from the motion under the torques that were applied, as the model of the
+    robots has it; `measured` from force sensors or a momentum observer. Only a wrong model, a
+    contact that no sensor measures, or torques that were not applied as known part them.
+
+    Args:
+        account: The account at a tick.
+        measured: Integral of the measured power since the account began [J].
+        exchanged: Integral of its size [J].
+    """
+    error = account.received - measured
+    if abs(error) <= MODEL_ERROR + MODEL_SHARE * exchanged:
+        return ""
+    return (
+        f"received {account.received:.3g} J by the motion, {measured:.3g} J by the forces: wrong "
+        "model, contact without a sensor, or torques not as known"
+    )
 
 
 def quantities(account: EnergyAccount, supplied: float, measured: float) -> tuple[float, ...]:

@@ -31,6 +31,7 @@ class Command:
         paid: Torque that the tank pays like the decoupling, shape (n,); None for zero.
         damped: Torque of joint dampers and stops, shape (n,); None for zero.
         other: All the rest, shape (n,): joint limits, and what was cut; None for zero.
+        repulsion: The part -dV/dq of it, shape (n,); None for zero.
         whole: False where the torque is none that was sent, so that nothing refills the tank.
     """
 
@@ -44,6 +45,7 @@ class Command:
     paid: Array | None = None
     damped: Array | None = None
     other: Array | None = None
+    repulsion: Array | None = None
     whole: bool = True
 
     def at_reserve(self) -> Array | None:

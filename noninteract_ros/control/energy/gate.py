@@ -229,7 +229,7 @@ class EnergyGate:
             self._account,
             kinetic=kinetic,
             dissipated=self.tank.damping * dampers,
-            demand=terms.added.power,
+            demand=terms.share * terms.added.power,
             fixed=SIGMAS.get(law),
         )
         self._last, self._lifted = terms, lifted
@@ -304,6 +304,7 @@ class EnergyGate:
         decoupling, inputs = command.decoupling_force, command.input_force
         led = float(inputs @ moved)
         beyond = turned
+        against = 0.0
         if last.share < 1.0:  # The port is that of the whole motion, v_r = 0.
             pulled = inputs + command.impedance_force + decoupling
             led += float(pulled @ travelled)
@@ -318,6 +319,9 @@ class EnergyGate:
             led += float((0.5 * (last.dynamics.g + terms.dynamics.g) - dynamics.g) @ followed)
             mean = 0.5 * (last.led.feed_forward + motion.feed_forward)
             led -= float(mean @ beyond) + 0.5 * float(late @ moved)
+            if command.repulsion is not None:  # V moves with the joints, references against it.
+                against = float(command.repulsion @ followed)
+                led -= against
             if command.feed_forward is not None:
                 led += float(command.feed_forward @ beyond)
         elif command.feed_forward is not None:  # Sent before the references came to rest.
@@ -325,7 +329,7 @@ class EnergyGate:
         paid = float(decoupling @ moved)
         if command.paid is not None:
             paid += float(command.paid @ beyond)
-        other = float(command.impedance_force @ moved) + held
+        other = float(command.impedance_force @ moved) + held + against
         if (rest := command.at_reserve()) is not None:
             other += float(rest @ beyond)
         arrived = last.impedance.potential(self._layout.difference(terms.x, predicted))
@@ -343,7 +347,7 @@ class EnergyGate:
             margins=terms.margins,
             led=jump + led,
             storage=float((own + potential).sum()),
-            demand=terms.added.power,
+            demand=terms.share * terms.added.power,
         )
         return interval, other + paid + led, jump
 

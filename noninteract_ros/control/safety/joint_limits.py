@@ -20,6 +20,7 @@ class Guard(NamedTuple):
 
     Attributes:
         torque: -dV/dq - d(q) v and the brakes, shape (n,) [N or N m]; None for zero.
+        repulsion: The part -dV/dq of it, shape (n,); None for zero.
         potential: V [J].
         repelled: Joints inside the margin of a position limit, as indices.
         too_fast: Joints beyond their velocity limit, as indices.
@@ -27,6 +28,7 @@ class Guard(NamedTuple):
     """
 
     torque: Array | None
+    repulsion: Array | None
     potential: float
     repelled: tuple[int, ...]
     too_fast: tuple[int, ...]
@@ -68,7 +70,7 @@ class JointMargins:
         self._bounded = bool(np.isfinite(team.position_limits).any())
         self._fast = bool(np.isfinite(team.velocity_limits).any())
         self._none: Array = np.zeros(team.n)
-        self._free = Guard(None, 0.0, (), (), self._none)
+        self._free = Guard(None, None, 0.0, (), (), self._none)
 
     def depth(self, q: Array) -> Array:
         """Return how far each joint is inside a margin, shape (n,), with the limit's sign."""
@@ -98,19 +100,23 @@ class JointMargins:
         if not inside and excess is None:
             return self._free
         torque, potential = np.zeros_like(v), 0.0
+        repulsion: Array | None = None
         repelled: tuple[int, ...] = ()
         if inside:
             size = np.abs(depth)
             into = np.maximum(size - onset, 0.0)
             damping = self._damping * np.minimum(size / self._margin, 1.0)
-            torque -= self._stiffness * np.copysign(into, depth) + damping * v
+            repulsion = -self._stiffness * np.copysign(into, depth)
+            torque += repulsion - damping * v
             potential = float(0.5 * (self._stiffness * into) @ into)
             repelled = tuple(np.flatnonzero(depth).tolist())
         too_fast: tuple[int, ...] = ()
         if excess is not None:
             torque -= self._braking * excess
             too_fast = tuple(np.flatnonzero(excess).tolist())
-        return Guard(torque, potential, repelled, too_fast, onset if inside else self._none)
+        return Guard(
+            torque, repulsion, potential, repelled, too_fast, onset if inside else self._none
+        )
 
     def _excess(self, v: Array) -> Array | None:
         """Speed beyond the limits, shape (n,); None for none."""

@@ -103,7 +103,9 @@ class TorqueLimiter:
         if beyond or fit < 1.0:
             command, shares, effort_share, clipped = self._cut(command, terms, tank, guard, fit)
         elif guard.torque is not None:
-            command = replace(command, torque=wanted, other=guard.torque)
+            command = replace(
+                command, torque=wanted, other=guard.torque, repulsion=guard.repulsion
+            )
         rate_share = 1.0
         if self._rate > 0.0 and self._last is not None:
             asked = command.torque
@@ -149,19 +151,20 @@ class TorqueLimiter:
         law = sum(groups.scaled(shares), np.zeros_like(g))
         torque = np.clip(held + law, -limits, limits)
         led, paid, damped = command.feed_forward, command.paid, command.damped
-        undamped = command.impedance_force + tank.damping * command.dampers
+        dampers = terms.share * tank.damping * command.dampers
+        undamped = command.impedance_force + dampers
         sent = Command(
             torque=torque,
             dynamics=command.dynamics,
             dampers=command.dampers,
-            impedance_force=shares.springs * undamped
-            - shares.dampers * tank.damping * command.dampers,
+            impedance_force=shares.springs * undamped - shares.dampers * dampers,
             decoupling_force=shares.decoupling * command.decoupling_force,
             input_force=shares.inputs * command.input_force,
             feed_forward=None if led is None else shares.inputs * led,
             paid=None if paid is None else shares.decoupling * paid,
             damped=None if damped is None else shares.dampers * damped,
             other=torque - g - law,
+            repulsion=guard.repulsion,
         )
         return sent, shares, min(left), bool(full.any() and (held != base).any())
 
@@ -183,7 +186,7 @@ class TorqueLimiter:
 def groups_of(command: Command, terms: TickTerms, tank: EnergyTank) -> Groups:
     """Return the torques of a command by the part of the law that they belong to."""
     dynamics, none = command.dynamics, np.zeros_like(command.torque)
-    dampers = -tank.damping * command.dampers
+    dampers = -terms.share * tank.damping * command.dampers
     decoupling = dynamics.torque_of(command.decoupling_force)
     inputs = dynamics.torque_of(command.input_force)
     return Groups(

@@ -73,7 +73,7 @@ class LimitActivity:
             yield "at effort limits"
         if safety.rate_share < 1.0 or safety.rate_fit < 1.0:
             yield "at the torque-rate limit"
-        yield from _gates(tick.account, safety.shares.springs)
+        yield from _gates(tick.account, tick.law_share * safety.shares.springs)
         for joint in safety.repelled:
             yield f"{self._joints[joint]} at its position limit"
         if tick.walls is not None and tick.walls.active:
@@ -83,13 +83,13 @@ class LimitActivity:
 
 
 def _gates(account: EnergyAccount, allowed: float) -> Iterator[str]:
-    """Yield what the energy account holds back, beyond the share of springs that limits allow."""
+    """Yield what the energy account holds back where limits leave the springs whole."""
     if not account.gated:
         return
     tank = account.tank
     if tank.sigma < 1.0:
         yield "decoupling reduced since the energy tank was low: damping or ~/refill restores it"
-    if tank.nu < allowed:
+    if tank.nu < 1.0 and allowed == 1.0:
         if tank.nu <= RELEASED:
             yield "energy reserve spent: springs released, damping and gravity compensation hold"
         else:

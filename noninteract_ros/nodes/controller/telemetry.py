@@ -13,7 +13,12 @@ from trajectory_msgs.msg import MultiDOFJointTrajectory
 from noninteract_ros.arrays import Array
 from noninteract_ros.clock import seconds
 from noninteract_ros.control.controller import TeamController
-from noninteract_ros.control.energy.account import QUANTITIES, EnergyAccount, quantities
+from noninteract_ros.control.energy.account import (
+    QUANTITIES,
+    EnergyAccount,
+    model_error_text,
+    quantities,
+)
 from noninteract_ros.control.telemetry.limit_activity import LimitActivity
 from noninteract_ros.control.telemetry.subtask_energies import LABELS, rows
 from noninteract_ros.control.tick import Tick
@@ -77,6 +82,8 @@ class Telemetry:
         ]
         self._energy_codec = EnergyCodec(LABELS)
         self._team_energy = TeamEnergyPublisher(node)
+        # Sensors on some robots alone know nothing of the others; without any, an observer does.
+        self._known = len(general.force_sensors) in (0, len(team.names))
         create, names = node.create_publisher, stack.names
         motion, energy = MultiDOFJointTrajectory, Float64MultiArray
         self._state_publishers = [create(motion, f"{name}/state", LOOP_QOS) for name in names]
@@ -175,7 +182,14 @@ class Telemetry:
         values: dict[str, object] = {"smallest singular value": float(singular_values[-1])}
         for name, part in zip(self._stack.names, self._stack.slices, strict=True):
             values[f"{name} error"] = float(np.abs(self._tick.error.e[part]).max())
-        return values | self.safety.values() | account_values(self._tick.account)
+        measured, exchanged = self._team_energy.measured, self._team_energy.exchanged
+        account = self._tick.account
+        values |= self.safety.values() | account_values(account)
+        values["received by motion [J]"] = account.received
+        values["received by forces [J]"] = measured if self._known else "not known"
+        if self._known and (text := model_error_text(account, measured, exchanged)):
+            values["model error"] = text
+        return values
 
     def problem(self) -> str:
         """Return the error text of the energy account, or ""."""
@@ -189,6 +203,10 @@ class TeamEnergyPublisher:
 
     Args:
         node: Controller node.
+
+    Attributes:
+        measured: Energy received since the account began, by measured or estimated forces [J].
+        exchanged: Integral of the size of its power [J].
     """
 
     def __init__(self, node: ScenarioNode) -> None:
@@ -197,9 +215,9 @@ class TeamEnergyPublisher:
         self.reset()
 
     def reset(self) -> None:
-        """Reset the integral of the measured power."""
+        """Reset the integrals of the measured power."""
         self._last: tuple[float, float, int] | None = None
-        self._measured = 0.0
+        self.measured = self.exchanged = 0.0
 
     def publish(self, stamp: int, tick: Tick, external_torque: Array) -> None:
         """Publish the account of a tick.
@@ -213,12 +231,13 @@ class TeamEnergyPublisher:
         force = tick.dynamics.force_of(external_torque)
         supplied = float(tick.error.e_rate @ force)
         if self._last is None or self._last[2] != account.number:
-            self._measured = 0.0
+            self.measured = self.exchanged = 0.0
         else:
             before, power, _ = self._last
-            self._measured += 0.5 * (now - before) * (power + supplied)
+            self.measured += 0.5 * (now - before) * (power + supplied)
+            self.exchanged += 0.5 * (now - before) * (abs(power) + abs(supplied))
         self._last = (now, supplied, account.number)
-        numbers = quantities(account, supplied, self._measured)
+        numbers = quantities(account, supplied, self.measured)
         self._publisher.publish(self._codec.encode(np.array((now, *numbers))))
 
 
