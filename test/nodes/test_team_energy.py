@@ -89,4 +89,4 @@ def test_the_gates_stay_open_in_the_paper_experiment(ros: Ros) -> None:
     accounts = AccountMonitor(ros)
     ros.stack(paper()).start().run_until(3.0)
     assert len(accounts.rows) > 600
-    assert {(row["sigma"], row["grip"]) for row in accounts.rows} == {(1.0, 1.0)}
+    assert {(row["sigma"], row["nu"]) for row in accounts.rows} == {(1.0, 1.0)}

@@ -107,7 +107,7 @@ def test_the_figure_shows_the_whole_account(pair: Recorded) -> None:
     expected = [
         ("energy [J]", [found.storage, found.tank, found.reserve]),
         ("power [W]", [found.supplied, found.dissipated, found.demand]),
-        ("gate", [found.sigma, found.grip]),
+        ("gate", [found.sigma, found.nu]),
         ("energy [J]", [found.received, found.residual]),
     ]
     assert [axes.get_ylabel() for axes in figure.axes] == [label for label, _ in expected]
