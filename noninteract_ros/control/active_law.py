@@ -30,6 +30,7 @@ class ActiveLaw:
 
     Attributes:
         previous: Mode that a change has replaced since the last tick, or None.
+        escaping: True while the team leaves a singularity in which it was found.
     """
 
     def __init__(
@@ -39,6 +40,7 @@ class ActiveLaw:
         self._transition_time = transition_time
         self._fade, self._torque_fade, self._stop = Fade(), Fade(), stop
         self.previous: Mode | None = None
+        self.escaping = False
 
     def reset(self) -> None:
         """End all fades: the team's clock starts anew."""
@@ -219,9 +221,17 @@ class ActiveLaw:
         return self._with_pull(command, pull)
 
     def _with_pull(self, command: Command, pull: Array | None) -> Command:
-        """Return a command with the pull out of a singularity, as far as the tank pays for it."""
+        """Return a command with the pull out of a singularity.
+
+        The tank pays for the way back to a regular state; an escape is a motion that the team
+        makes by itself, booked like that of references.
+        """
         if pull is None:
             return command
-        dynamics = command.dynamics
-        torque = dynamics.torque(np.zeros_like(pull), self._gate.tank.sigma * pull) - dynamics.g
+        dynamics, still = command.dynamics, np.zeros_like(pull)
+        if self.escaping:
+            led = dynamics.torque(still, pull) - dynamics.g
+            asked = led if command.feed_forward is None else command.feed_forward + led
+            return replace(command, torque=command.torque + led, feed_forward=asked)
+        torque = dynamics.torque(still, self._gate.tank.sigma * pull) - dynamics.g
         return replace(command, torque=command.torque + torque, paid=torque)

@@ -245,6 +245,7 @@ class TeamController:
             self.gate.loosen(share * self.gate.tank.nu)
         guard = self._margins.at(depth, v, self._onset)
         pull = self._guard.pull(q, share, self._mode.stopped, step)
+        self._law.escaping = self._guard.searching
         asked, acceleration = self._law.command(
             self._mode, self._view, seen, terms, pull, self._guard.damping(share)
         )
