@@ -265,7 +265,7 @@ def test_a_team_put_into_a_singularity_moves_out_by_itself():
     loop = jumped_into_a_singularity()
     ticks = [loop.tick() for _ in range(1500)]
     assert ticks[0].law_share == 0.0
-    assert ticks[-1].law_share > 0.8
+    assert ticks[-1].law_share > 0.5
     torques = np.array([tick.torque for tick in ticks])
     speeds = np.array([tick.state.v for tick in ticks])
     assert np.abs(np.diff(torques, axis=0)).max() < 0.05 * np.abs(torques).max()
@@ -307,7 +307,7 @@ def test_the_way_out_stays_within_joint_limits():
     q = np.array([loop.tick().state.q for _ in range(1000)])
     assert q[:, [1, 3]].min() > -0.02
     assert q[:, [1, 3]].max() <= 0.4
-    assert q[-1, [1, 3]].min() > 0.1
+    assert q[-1, [1, 3]].min() > 0.05
 
 
 def test_a_team_put_into_a_singularity_is_held_where_it_may_not_move_out():
