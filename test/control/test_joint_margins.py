@@ -107,8 +107,10 @@ def test_a_repelled_joint_is_damped_both_ways():
 
 
 def test_margins_of_narrow_joints_do_not_overlap():
-    """A joint with less room than two margins is free in its middle; a fixed one is finite."""
-    narrow = team(lower_limit=((-2.0, -0.5), (-1.0, 1.0)), upper_limit=((2.0, -0.3), (1.0, 1.0)))
+    """A joint with less room than two margins is free in its middle; an almost fixed one is finite."""
+    narrow = team(
+        lower_limit=((-2.0, -0.5), (-1.0, 1.0)), upper_limit=((2.0, -0.3), (1.0, 1.0 + 1e-6))
+    )
     margins = JointMargins(narrow, SETTINGS)
     q = np.array([0.7, -0.4, 0.2, 1.0])
     assert guard(margins, q, np.full(4, 0.1)).torque is None

@@ -29,6 +29,7 @@ def tick(
         in_transition=False,
         intervened=law_share < 1.0 or safety.acted or sigma < 1.0 or nu * damping < 1.0,
         account=SimpleNamespace(gated=True, tank=tank, sigma=sigma),
+        walls=None,
     )
 
 

@@ -263,9 +263,9 @@ def jumped_into_a_singularity(**keys) -> SingularityLoop:
 def test_a_team_put_into_a_singularity_moves_out_by_itself():
     """Softly, to where the law is almost whole again; then it can be led as ever."""
     loop = jumped_into_a_singularity()
-    ticks = [loop.tick() for _ in range(1500)]
+    ticks = [loop.tick() for _ in range(2500)]
     assert ticks[0].law_share == 0.0
-    assert ticks[-1].law_share > 0.5
+    assert ticks[-1].law_share > 0.8
     torques = np.array([tick.torque for tick in ticks])
     speeds = np.array([tick.state.v for tick in ticks])
     assert np.abs(np.diff(torques, axis=0)).max() < 0.05 * np.abs(torques).max()
