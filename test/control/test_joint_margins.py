@@ -107,14 +107,12 @@ def test_a_repelled_joint_is_damped_both_ways():
 
 
 def test_margins_of_narrow_joints_do_not_overlap():
-    """A joint with less room than two margins is free in its middle; an almost fixed one is finite."""
-    narrow = team(
-        lower_limit=((-2.0, -0.5), (-1.0, 1.0)), upper_limit=((2.0, -0.3), (1.0, 1.0 + 1e-6))
-    )
-    margins = JointMargins(narrow, SETTINGS)
+    """A joint with less room than two margins is free in its middle, however little that is."""
+    lower, upper = ((-2.0, -0.5), (-1.0, 1.0 - 1e-6)), ((2.0, -0.3), (1.0, 1.0 + 1e-6))
+    margins = JointMargins(team(lower_limit=lower, upper_limit=upper), SETTINGS)
     q = np.array([0.7, -0.4, 0.2, 1.0])
     assert guard(margins, q, np.full(4, 0.1)).torque is None
-    q[0] = 1.95  # Another joint is repelled while the fixed one is where it has to be.
+    q[0] = 1.95
     assert np.isfinite(torque(margins, q)).all()
     assert guard(margins, q).repelled == (0,)
     q[0] = 0.7
