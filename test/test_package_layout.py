@@ -127,7 +127,7 @@ def test_a_circle_is_found() -> None:
 
 
 def test_no_program_imports_what_only_validates() -> None:
-    """What checks the law before anything moves is loaded by no program of a run."""
+    """No program of a run loads the checks of `validation`."""
     for program in PROGRAMS.values():
         reached = structure.closure(GRAPH, f"nodes.{program}")
         assert {name for name in reached if name.startswith("validation")} == set()

@@ -213,7 +213,7 @@ class TeamController:
         # At the tick of a stop the inputs still count, so that the torque starts without a step.
         previous = self._law.previous
         stopped = self._mode.stopped and (previous is None or previous.stopped)
-        # A team that looks for a way out of a singularity must not hold what lies inside it.
+        # During a singularity escape the subtasks must not hold singular values.
         searching = self._guard.searching
         if restarted or stopped or searching or (previous and previous.stopped):
             self._rest_at(seen.task.x)

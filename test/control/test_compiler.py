@@ -35,7 +35,7 @@ def test_code_is_cached_until_what_it_calls_changes(tmp_path: Path) -> None:
 
 
 def test_a_full_disk_costs_only_time(tmp_path: Path) -> None:
-    """Where machine code cannot be saved, the process goes on with what it has compiled."""
+    """If machine code cannot be saved, the process continues with the compiled function."""
     shutil.copy(Path(str(compiler.__file__)), tmp_path / "compiler.py")
     (tmp_path / "outside.py").write_text(OUTER)
     (tmp_path / "inside.py").write_text(INNER.format(1))

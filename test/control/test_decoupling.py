@@ -305,7 +305,7 @@ def test_decoupled_external_force_undoes_the_decoupling_matrix():
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("keys", CASES)
 def test_input_to_one_subtask_moves_no_other_at_once(law, keys):
-    """What one subtask is asked leaves the others' accelerations, except under `natural`."""
+    """An input to one subtask leaves the others' accelerations, except under `natural`."""
     case = Case(**keys)
     crossed = 0.0
     for seed in range(10):

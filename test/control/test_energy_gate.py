@@ -102,7 +102,7 @@ class DelayedLoop:
 
 @pytest.mark.parametrize("rate", [100.0, 250.0, 1000.0])
 def test_the_account_balances_at_any_rate(rate):
-    """What the push did is what the account infers, to the integrator; W grows by no more."""
+    """The account infers the work of a push, to the integrator; W grows by no more."""
     loop = DelayedLoop(rate)
     loop.run(0.6)
     account = loop.answer().account

@@ -49,7 +49,7 @@ def held(tank):
 
 
 def test_the_account_balances_to_rounding():
-    """What is held changes by the work taken in, the references' share, credit and loss alone."""
+    """The stored energy changes by absorbed work, the references' share, credit and loss alone."""
     tank = full_tank(LEVELS, 0.0)
     for interval in random_intervals(2000):
         after = advance(tank, interval, LEVELS)
@@ -62,7 +62,7 @@ def test_the_account_balances_to_rounding():
 
 
 def test_the_gates_stay_in_range_and_sigma_within_its_rates():
-    """Whatever is booked, no gate leaves 0 to 1 and sigma never steps."""
+    """For any booking, no gate leaves 0 to 1 and sigma never steps."""
     tank = full_tank(LEVELS, 0.0)
     for interval in random_intervals(2000, seed=4):
         after = advance(tank, interval, LEVELS)
@@ -91,7 +91,7 @@ def test_an_empty_tank_does_not_fill_by_itself():
 
 
 def test_a_fraction_of_the_damping_refills_the_tank_up_to_its_capacity():
-    """What the impedance absorbs refills the tank by its share and no further than full."""
+    """Energy that the impedance absorbs refills the tank by its share and no further than full."""
     tank = tank_with(0.0, sigma=0.0)
     damped = STILL._replace(other_work=-0.1)
     tank = advance(tank, damped, LEVELS)
@@ -132,7 +132,7 @@ def test_an_operator_refill_opens_the_gate_at_its_own_rate():
 
 
 def test_a_change_waits_until_the_tank_can_pay():
-    """What is beyond the open tank is taken in shares; what returns energy is free."""
+    """Costs beyond the open tank are paid in shares; a return of energy is free."""
     tank = full_tank(LEVELS, 0.0)
     spare = tank.level - SETTINGS.full_gate
     assert affordable(tank, 4.0 * spare, LEVELS) == pytest.approx(0.25)
@@ -160,7 +160,7 @@ def test_an_account_without_gates_has_whole_springs():
 
 
 def test_new_sums_grant_nothing():
-    """Where a state does not follow, energies, gates and the references' debt go on."""
+    """After a discontinuity of states, energies, gates and the references' debt go on."""
     tank = full_tank(LEVELS, 0.0)._replace(level=0.3, reserve=-0.5, nu=0.0, sigma=0.2, owed=0.4)
     for potential in (0.3, 0.0):
         led = STILL._replace(arrived=tank.potential, potential=potential, storage=1.0)
@@ -175,7 +175,7 @@ def test_new_sums_grant_nothing():
 
 
 def test_springs_that_a_limit_loosens_come_back():
-    """What they give up waits in the reserve, beyond its capacity, and pays for their return."""
+    """Energy of yielding springs waits in the reserve, beyond its capacity, for their return."""
     tank = full_tank(LEVELS, 0.0)
     brought = 0.0
     for potential in (1.0, 2.0, 4.0):
@@ -214,7 +214,7 @@ def test_a_debt_is_repaid_by_the_dampers():
 
 
 def test_dampers_that_feed_a_motion_let_go_and_come_back_when_they_damp():
-    """What torques that come late feed is bounded by the reserve; a share of them is judged."""
+    """Energy fed by late torques is bounded by the reserve; a share of them is judged."""
     tank = full_tank(LEVELS, 0.0)
     for _ in range(100):
         tank = advance(tank, STILL._replace(damped=-0.1, other_work=0.1 * tank.damping), LEVELS)
@@ -279,14 +279,14 @@ def test_what_the_decoupling_returns_does_not_reopen_its_gate():
 
 
 def test_a_demand_beyond_a_full_tank_owes_nothing():
-    """What only the power wanted for a moment has closed opens when it is over."""
+    """A gate that a short peak of power has closed opens when the peak is over."""
     tank = advance(tank_with(SETTINGS.capacity), STILL._replace(demand=1000.0), LEVELS)
     assert tank.sigma < 1.0
     assert advance(tank, STILL, LEVELS).sigma > tank.sigma
 
 
 def test_reopenings_are_bounded_by_what_came_in():
-    """Whatever lends and returns, each reopening after a shortage has cost a whole quantum."""
+    """For any exchange of energy, each reopening after a shortage costs a whole quantum."""
     tank, came_in, reopenings, falling = tank_with(1.0), 0.0, 0, True
     rng = np.random.default_rng(11)
     for _ in range(30_000):

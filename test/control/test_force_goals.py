@@ -125,7 +125,7 @@ def test_a_goal_comes_without_a_bump_and_is_paid():
 
 
 def test_integrals_stay_within_bounds_and_stand_still_while_held():
-    """Whatever is missing, regulation adds no more than its bound, and nothing while held."""
+    """For any missing force, regulation adds no more than its bound, and nothing while held."""
     run = at_wall()
     impedance = run.controller.mode.impedance
     goals = ForceGoals(4)

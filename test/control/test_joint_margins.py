@@ -56,7 +56,7 @@ def test_inside_all_limits_there_is_no_torque():
 
 
 def inertia_of(joint: int, given: Team) -> float:
-    """What a joint feels of the team's inertia when all others are free."""
+    """Return the inertia at a joint when all others are free."""
     M = given.state(given.q0, np.zeros(4)).M
     return float(1.0 / np.linalg.solve(M, np.eye(4)[joint])[joint])
 
@@ -125,7 +125,7 @@ def test_margins_of_narrow_joints_do_not_overlap():
 
 
 def test_a_joint_that_is_too_fast_is_braked():
-    """What is beyond the limit of speed decays at the given rate; others go on."""
+    """Excess speed beyond the limit decays at the given rate; other joints go on."""
     given = team()
     margins = JointMargins(given, SETTINGS)
     for speed, excess in ((2.0, 0.0), (2.5, 0.5), (-2.0, 0.0), (-3.0, -1.0)):

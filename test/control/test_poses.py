@@ -279,7 +279,7 @@ def test_storage_follows_supplied_and_dissipated_power(keys, inputs):
 
 @pytest.mark.parametrize(("keys", "inputs"), DRIVEN)
 def test_the_energy_balance_closes_with_the_integrator_s_order(keys, inputs):
-    """What is stored is what was supplied less what was dissipated; the rest falls as h^4."""
+    """Stored energy is supplied less dissipated energy; the rest falls as h^4."""
     rests = []
     for steps in (15, 30, 60):
         rows = Motion(Case(**keys), **inputs).run(0.3, steps)

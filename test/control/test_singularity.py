@@ -75,7 +75,7 @@ class SingularityLoop:
         return found
 
     def answer(self):
-        """What the controller would do now, without moving on; to be asked once a tick."""
+        """Return the tick of the controller at the present state; call once a tick."""
         return self.controller.step(self.simulation.now, self.simulation.q, self.simulation.v)
 
 

@@ -65,7 +65,7 @@ def rest_time(ticks: list[Tick]) -> float:
 
 
 def way(before: Tick, ticks: list[Tick], part: slice) -> float:
-    """How far a subtask went from where it was at `before` [m]."""
+    """Return the distance of a subtask from its value at `before` [m]."""
     return float(
         np.linalg.norm([t.task.x[part] - before.task.x[part] for t in ticks], axis=1).max()
     )
@@ -108,7 +108,7 @@ def test_the_torque_of_a_stop_rises_without_a_step() -> None:
 
 
 def test_a_stop_keeps_the_limit_of_the_torque_rate_and_still_comes_to_rest() -> None:
-    """Where the limit is lower than what the stop would ask for, it takes a little longer."""
+    """A limit below the torque of the stop makes it take a little longer."""
     limit = 300.0
     free, bounded = SubtaskCommand(*FAST), SubtaskCommand(*FAST, safety={"torque_rate": limit})
     assert torque_rates(free.before, free.stopped()).max() > 2.0 * limit

@@ -262,7 +262,7 @@ def test_stop_is_latched():
 
 
 def test_inputs_do_not_pile_up_during_a_stop():
-    """What comes due during a stop is taken off the queue, of both sources."""
+    """Inputs that fall due during a stop are removed from the queues of both sources."""
     loop = ArmsLoop()
     loop.controller.stop()
     loop.run(50, (0.1, 0.1))
@@ -319,7 +319,7 @@ def test_a_team_put_elsewhere_starts_anew():
 
 @pytest.mark.parametrize("stops", [True, False])
 def test_a_team_put_back_is_pushed_by_nothing_of_before(stops):
-    """However near its start is: no reference, no fading torque and no account goes on."""
+    """After a reset near the start no reference and no fading torque goes on."""
     loop = ArmsLoop()
     loop.run(60, (0.1, 0.06))
     spent = loop.controller.gate.account.number
@@ -386,7 +386,7 @@ def test_gains_that_do_not_fit_are_refused_and_nothing_changes():
 
 
 def test_feedback_is_the_coupling_force():
-    """What an operator feels is D e_rate + h(e) of the gains in force."""
+    """The feedback of an operator is D e_rate + h(e) of the gains in force."""
     tick = disturbed_loop().tick()
     K, D = np.array([25.0, 25.0, 50.0, 50.0]), np.array([20.0, 20.0, 25.0, 25.0])
     np.testing.assert_allclose(tick.feedback, D * tick.error.e_rate + K * tick.error.e, rtol=1e-12)

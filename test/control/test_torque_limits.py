@@ -32,7 +32,7 @@ def test_what_fits_is_whole():
 
 
 def test_every_sum_fits_in_the_end():
-    """Whatever is asked for, the base stays and the sum keeps within the limits."""
+    """For any request the base stays and the sum keeps within the limits."""
     rng = np.random.default_rng(1)
     for _ in range(500):
         groups = random_groups(rng)

@@ -212,7 +212,7 @@ def walls(orders: tuple[int, int] = (1, 0)) -> tuple[Walls, SubtaskStack, Team]:
 
 @pytest.mark.parametrize("sigma", [0.0, 0.4, 1.0])
 def test_forces_lead_to_an_acceleration_within_the_walls(sigma: float) -> None:
-    """Whatever is asked for, all rows hold after the walls' forces, at any sigma."""
+    """For any request all rows hold after the walls' forces, at any sigma."""
     found, stack, team = walls()
     rng = np.random.default_rng(7)
     pushed = 0

@@ -125,7 +125,7 @@ def test_a_grip_without_rotational_gains_exerts_no_torque():
 
 
 def test_a_wall_pushes_along_its_normal_and_never_pulls():
-    """Whatever the speed, the force is along the normal or zero; outside it is zero."""
+    """At any speed the force is along the normal or zero; outside it is zero."""
     rng = np.random.default_rng(4)
     pulls = 0
     for depth in np.linspace(-0.05, 0.05, 41):

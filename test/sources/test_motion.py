@@ -45,7 +45,7 @@ def test_derivatives_match_finite_differences(name):
     [("waypoints", TIMES), ("circle", [0.0, 0.9]), ("replay", [0.1, 1.0, 3.9])],
 )
 def test_joints_are_twice_continuously_differentiable(name, instants):
-    """Where two pieces meet, position, velocity and acceleration do not jump."""
+    """At the joint of two pieces, position, velocity and acceleration do not jump."""
     for t in instants:
         before, after = MOTIONS[name](t - 1e-9), MOTIONS[name](t + 1e-9)
         np.testing.assert_allclose(before.position, after.position, atol=1e-7)

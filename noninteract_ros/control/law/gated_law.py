@@ -18,7 +18,7 @@ from noninteract_ros.control.law.impedance import Impedance
 
 @dataclass(frozen=True, slots=True)
 class Decoupling:
-    """What complete decoupling adds to the natural law at a state, with all gates open.
+    """Contribution of complete decoupling to the natural law at a state, with all gates open.
 
     Attributes:
         acceleration: Task acceleration of the noninteracting law, shape (n,).

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a scenario can say about singularities and the limits of joints."""
+"""Settings of singularities and of the limits of joints."""
 
 from dataclasses import dataclass
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Singularities, where assumption 3 fails: share of the decoupling, and the way out."""
+"""Singularities, where assumption 3 fails: share of the decoupling, and recovery."""
 
 from typing import Protocol
 

@@ -48,9 +48,9 @@ class Stop:
             velocity: Of the subtasks, shape (n,) [m/s; rad/s].
         """
         self._began = now
-        swiftness = float(np.max(np.abs(velocity) / self._max_jerk))
+        speed_over_jerk = float(np.max(np.abs(velocity) / self._max_jerk))
         quickest = RANGE * self._slowest
-        fitting = np.sqrt(RAMP * JERKS / swiftness) if swiftness > 0.0 else quickest
+        fitting = np.sqrt(RAMP * JERKS / speed_over_jerk) if speed_over_jerk > 0.0 else quickest
         self._rate = float(np.clip(fitting, self._slowest, quickest))
 
     def damping(self, now: float) -> float:

@@ -15,7 +15,7 @@ DAMPED = 0.2  # share of the barrier's depth from which on all of the damping ac
 
 @dataclass(frozen=True, slots=True)
 class Push:
-    """What a barrier does at a state.
+    """Effect of a barrier at a state.
 
     Attributes:
         torque: Shape (n,) [N or N m].

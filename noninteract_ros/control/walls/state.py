@@ -24,7 +24,7 @@ class GovernedMotion:
 
 @dataclass(frozen=True, slots=True)
 class WallState:
-    """What walls keep from tick to tick.
+    """State of the walls, kept from tick to tick.
 
     Attributes:
         multipliers: Of the rows that were active, by label.

@@ -63,7 +63,7 @@ class WallView:
 
 @dataclass(frozen=True, slots=True)
 class WallForces:
-    """What walls add to the torque of a tick.
+    """Contribution of the walls to the torque of a tick.
 
     Attributes:
         passive: (1 - sigma) C'l and the barrier's push, shape (n,) [N or N m]: along the walls'
