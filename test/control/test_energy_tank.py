@@ -165,7 +165,7 @@ def test_new_sums_grant_nothing():
     for potential in (0.3, 0.0):
         led = STILL._replace(arrived=tank.potential, potential=potential, storage=1.0)
         tank = advance(tank._replace(nu=1.0), led, LEVELS)
-    found = carry(tank, 0.1, 0.0)
+    found = carry(tank, LEVELS, 0.1, 0.0)
     same = ("level", "reserve", "sigma", "nu", "damping", "dampers", "owed")
     assert [getattr(found, name) for name in same] == [getattr(tank, name) for name in same]
     again = found._replace(nu=1.0, potential=0.0)

@@ -270,7 +270,7 @@ class EnergyGate:
     def _begin(self, terms: TickTerms, law: str, kinetic: float) -> None:
         """Begin new sums; what tank and reserve hold goes on."""
         self._number += 1
-        tank = carry(self.tank, terms.potential(), terms.margins)
+        tank = carry(self.tank, self._levels, terms.potential(), terms.margins)
         tank = tank if law == GATED else whole(tank, self.tank)
         start = kinetic + tank.nu * tank.potential + tank.margins + tank.reserve + tank.level
         self._account = EnergyAccount(

@@ -203,19 +203,21 @@ def full_tank(limits: TankLevels, potential: float) -> EnergyTank:
     )
 
 
-def carry(tank: EnergyTank, potential: float, margins: float) -> EnergyTank:
+def carry(tank: EnergyTank, limits: TankLevels, potential: float, margins: float) -> EnergyTank:
     """Return the same account at the start of new sums, where a state does not follow.
 
-    Energies and gates go on, and so does what references must bring before they earn credit.
+    Energies and gates go on, but no more than a fresh account has, and so does what references
+    must bring before they earn credit.
 
     Args:
         tank: The account.
+        limits: Its levels.
         potential: U of the errors that the new sums begin with [J].
         margins: V there [J].
     """
     return EnergyTank(
-        level=tank.level,
-        reserve=tank.reserve,
+        level=min(tank.level, limits.initial),
+        reserve=min(tank.reserve, limits.reserve),
         sigma=tank.sigma,
         nu=tank.nu,
         damping=tank.damping,
