@@ -10,6 +10,8 @@ from harness import Ros, TeamMonitor, paper
 from programs import Programs
 from waiting import until
 
+from noninteract_ros.nodes.common.team_status import main_state
+
 NAMES = ["robot_team", "controller", "haptic_emulator", "relative_planner"]
 RATE = 100.0
 
@@ -42,7 +44,7 @@ def shares_memory(process: int) -> bool:
 
 
 def running(monitor: TeamMonitor) -> bool:
-    return all(monitor.status.get(name, (0, ""))[1] == "running" for name in NAMES)
+    return all(main_state(monitor.status.get(name, (0, ""))[1]) == "running" for name in NAMES)
 
 
 @pytest.mark.parametrize("lockstep", [True, False], ids=["lockstep", "wall"])

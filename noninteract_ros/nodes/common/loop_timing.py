@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Timing of a loop in wall time: achieved rate, answered share and latency."""
 
+import math
+import time
 from collections import deque
 
 import numpy as np
@@ -9,6 +11,7 @@ from noninteract_ros.clock import seconds
 from noninteract_ros.nodes.messages.messages import Level
 
 WINDOW = 4.0  # [s] of answers that are evaluated
+RECENT = 1.0  # [s] age of the last answer up to which the answers are evaluated
 MIN_ANSWERS = 50  # Fewer answers are not evaluated.
 WARN_SHARE, ERROR_SHARE = 0.99, 0.90
 
@@ -28,6 +31,7 @@ class LoopTiming:
             maxlen=max(MIN_ANSWERS, int(WINDOW * rate))
         )
         self._last: int | None = None
+        self._recorded_at = -math.inf
 
     def record(self, stamp: int, latency: float) -> None:
         """Record an answer.
@@ -36,6 +40,7 @@ class LoopTiming:
             stamp: Stamp of the answered state [ns].
             latency: Time from the stamp to the command [s].
         """
+        self._recorded_at = time.monotonic()
         gap = 0.0 if self._last is None else seconds(stamp - self._last)
         self._last = stamp
         if 0.0 < gap <= self._max_gap:
@@ -48,8 +53,9 @@ class LoopTiming:
 
     @property
     def evaluated(self) -> bool:
-        """True where there are enough answers."""
-        return len(self._answers) >= MIN_ANSWERS
+        """True where there are enough answers, the last one just now: a paused team has none."""
+        recent = time.monotonic() - self._recorded_at < RECENT
+        return recent and len(self._answers) >= MIN_ANSWERS
 
     def summary(self) -> tuple[float, float, np.ndarray]:
         """Return achieved rate [Hz], share answered within the period, and latencies [s]."""

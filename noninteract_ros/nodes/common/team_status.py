@@ -14,6 +14,11 @@ REASONS = {PAUSED: "the team is paused", FINISHED: "the team has finished"}
 STATUS_TIMEOUT = 4.0 * DIAGNOSTICS_PERIOD  # [s] without diagnostics after which it has ended
 
 
+def main_state(message: str) -> str:
+    """Return a status message without the problems that a node appends to it."""
+    return message.partition("; ")[0]
+
+
 class TeamStatus:
     """Subscription to the diagnostics of the simulated team.
 
@@ -31,7 +36,7 @@ class TeamStatus:
     def _on_diagnostics(self, message: DiagnosticArray) -> None:
         for item in message.status:
             if item.name == self._name:
-                self._reason = REASONS.get(item.message, "")
+                self._reason = REASONS.get(main_state(item.message), "")
                 self._received_at = time.monotonic()
 
     @property

@@ -9,7 +9,7 @@ from typing import Any
 from diagnostic_msgs.msg import DiagnosticArray
 
 from noninteract_ros.console.protocol import PageCommand
-from noninteract_ros.nodes.common.team_status import PAUSED, TEAM
+from noninteract_ros.nodes.common.team_status import PAUSED, TEAM, main_state
 from noninteract_ros.subtasks.stack import SubtaskStack
 
 STALE = 2.0  # [s] age of a program's diagnostics from which it is reported as missing
@@ -82,7 +82,7 @@ class StackStatus:
         value, until = self._expected.get(condition, (False, 0.0))
         if time.monotonic() < until:
             return value
-        return program in self._programs and self._programs[program].text == text
+        return program in self._programs and main_state(self._programs[program].text) == text
 
     def message(self, parameters: Mapping[str, Any], state_at: float) -> dict[str, Any]:
         """Return the message `status` for pages.

@@ -13,7 +13,7 @@ from rclpy.node import Node
 from std_srvs.srv import SetBool
 
 from noninteract_ros.errors import NoninteractError
-from noninteract_ros.nodes.common.team_status import FINISHED
+from noninteract_ros.nodes.common.team_status import FINISHED, main_state
 from noninteract_ros.nodes.messages.messages import Level
 
 
@@ -136,4 +136,4 @@ class Monitor:
     def finished(self) -> bool:
         """Return True if the team has finished."""
         team = self.status.get("robot_team")
-        return team is not None and team.text == FINISHED
+        return team is not None and main_state(team.text) == FINISHED

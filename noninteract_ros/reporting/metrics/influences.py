@@ -108,7 +108,7 @@ def _changes(recorded: Recorded) -> list[Influence]:
             texts[f"the controller restarted: {start}"] = None
         if (names := values.get("changed parameters", "none")) != "none":
             changed |= dict.fromkeys(names.split(", "))
-        if status["message"] == "stopped":
+        if status["message"].startswith("stopped"):
             texts["the controller was stopped"] = None
         for name, spec in recorded.scenario.subtasks.items():
             led_by = values.get(f"{name} led by", spec.input.authority).split(",")[0]
