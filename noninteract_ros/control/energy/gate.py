@@ -40,7 +40,7 @@ from noninteract_ros.subtasks.stack import SubtaskStack
 from noninteract_ros.team.team import Team
 
 GATED = "energy_gated"
-SMOOTH = 1e-4  # change of a reference's velocity in a tick that its prediction need not see
+SMOOTH = 1e-12  # relative jump of a reference velocity that counts as rounding
 SIGMAS = {"natural": 0.0, "noninteracting": 1.0, "paper": 1.0}  # of laws that have no gates
 
 
