@@ -102,7 +102,7 @@ def test_a_tick_reports_the_wall_that_pushes(led: Run) -> None:
     assert walls.least == pytest.approx(led.least[pushed[0]])
     assert "post" in walls.nearest
     assert walls.held
-    activity.update(1.0, led.ticks[pushed[0]])
+    activity.record(1.0, led.ticks[pushed[0]])
     assert activity.conditions(1.0) == [f"walls push: {walls.nearest}"]
     assert activity.values()["clearance, lowest [m]"] == walls.least
 
