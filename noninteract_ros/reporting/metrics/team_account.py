@@ -147,7 +147,8 @@ def _may_close(recorded: Recorded, found: TeamAccount) -> str:
 def limits_acted(recorded: Recorded, found: TeamAccount) -> bool:
     """Return True if joint limits or singularities changed the torque of the law.
 
-    Detected from the controller diagnostics, and from interventions while both gates are open.
+    Detected from the controller diagnostics, and from interventions: of a team with effort limits
+    at any time, since these close gates themselves, else while both gates are open.
     """
     statuses = recorded.run.diagnostics() if recorded.has("diagnostics") else []
     for status in statuses:
@@ -160,4 +161,6 @@ def limits_acted(recorded: Recorded, found: TeamAccount) -> bool:
     rows, others = common_times(recorded.since_start(series.stamps), found.t)
     both_open = (found.sigma[others] == 1.0) & (found.nu[others] == 1.0)
     more = np.diff(series[INTERVENTIONS][rows]) > 0.0
+    if np.isfinite(recorded.team.effort_limits).any():
+        return bool(more.any())
     return bool((more & both_open[1:] & both_open[:-1]).any())
